@@ -1,0 +1,1 @@
+"""References, metrics and pictures (rank 4)."""

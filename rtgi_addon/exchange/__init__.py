@@ -1,0 +1,1 @@
+"""Files (rank 4): the bake bundle, one file per engine."""

@@ -1,0 +1,1 @@
+"""Rays and light (rank 2): numpy and Embree."""
