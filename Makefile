@@ -1,0 +1,30 @@
+# `make demo` and `make test` set everything up first. RTGI_PYTHON=/path/to/python3.11 forces an interpreter.
+export RTGI_VENV ?= .venv
+PYTHON := $(RTGI_VENV)/bin/python
+PYTEST := $(PYTHON) -m pytest
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test test-fast lint bench
+
+help:                ## this list
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { sub(/ .*/, "", $$1); printf "make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+setup:               ## make the virtual environment with Blender's module and everything else (instant once done)
+	@sh tools/setup.sh
+
+demo: setup          ## bake sample_blends/cornell_box.blend into demo/ and draw its probes
+	$(PYTHON) -m rtgi_addon sample_blends/cornell_box.blend bake --out demo/cornell_box --picture demo/cornell_box.png
+	@echo "The bundle is in demo/cornell_box, the picture is demo/cornell_box.png"
+
+test: setup          ## run every test
+	$(PYTEST)
+
+test-fast: setup     ## run the tests that take less than a few seconds each
+	$(PYTEST) -m "not slow"
+
+lint: setup          ## check style
+	$(PYTHON) -m ruff check .
+
+bench: setup         ## measure again what benchmarks/README.md says
+	$(PYTHON) benchmarks/ray_rate.py
+	$(PYTHON) benchmarks/bake_vs_cycles.py
