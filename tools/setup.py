@@ -61,7 +61,7 @@ def is_ready(wanted):
 
 
 def clear_folder():
-    """Empty the environment's folder but for the stamp, which says 'unfinished' from now on. Raises SetupError if it is not ours."""
+    """Empty the environment's folder but for the stamp, which says 'unfinished' from now on. Raises SetupError if not ours."""
     if VENV.exists() and not STAMP.exists() and any(VENV.iterdir()):
         raise SetupError(f"{VENV} was not made by this set-up: rename it, or set RTGI_VENV to another folder")
     VENV.mkdir(parents=True, exist_ok=True)
@@ -104,7 +104,8 @@ def main():
     held = None
     try:
         held = lock()
-        wanted = {"requirements": hashlib.sha256(REQUIREMENTS.read_bytes()).hexdigest(), "forced": os.environ.get("RTGI_PYTHON", "")}
+        digest = hashlib.sha256(REQUIREMENTS.read_bytes()).hexdigest()
+        wanted = {"requirements": digest, "forced": os.environ.get("RTGI_PYTHON", "")}
         if not is_ready(wanted):
             make_environment(wanted)
     except SetupError as error:
