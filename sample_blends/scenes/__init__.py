@@ -1,8 +1,12 @@
 """The sample scenes, by name: each function fills the empty file that ``kit.reset`` leaves and returns nothing."""
 
+from .adversarial import adversarial
+from .atrium import atrium
+from .halls import many_lights
 from .outdoors import outdoor_hdri, sky_courtyard, sun_window
 from .rooms import cornell_box, corridor_door_ajar, furnace, integrating_sphere, two_rooms
 
 SAMPLES = {function.__name__: function for function in (
-    cornell_box, furnace, integrating_sphere, two_rooms, corridor_door_ajar, sky_courtyard, sun_window, outdoor_hdri,
+    cornell_box, furnace, integrating_sphere, two_rooms, corridor_door_ajar, sky_courtyard, sun_window, atrium, many_lights,
+    outdoor_hdri, adversarial,
 )}

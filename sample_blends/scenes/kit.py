@@ -160,6 +160,23 @@ def cavities(name: str, low, high, rooms, materials) -> bpy.types.Object:
     return mesh_object(name, np.concatenate(vertices), faces, names, index)
 
 
+def cube_uvs(obj: bpy.types.Object, metres: float = 1.0) -> bpy.types.Object:
+    """Unwrap ``obj`` by projecting each face along its dominant axis; one repeat of a texture covers ``metres``."""
+    mesh = obj.data
+    points, corners = np.empty(3 * len(mesh.vertices)), np.empty(len(mesh.loops), np.int32)
+    normals, starts = np.empty(3 * len(mesh.polygons)), np.empty(len(mesh.polygons), np.int32)
+    mesh.vertices.foreach_get("co", points)
+    mesh.loops.foreach_get("vertex_index", corners)
+    mesh.polygons.foreach_get("normal", normals)
+    mesh.polygons.foreach_get("loop_start", starts)
+    axis = np.abs(normals.reshape(-1, 3)).argmax(axis=1)
+    face = np.searchsorted(starts, np.arange(len(corners)), side="right") - 1
+    planes = np.array([(1, 2), (0, 2), (0, 1)])[axis[face]]
+    uv = np.take_along_axis(points.reshape(-1, 3)[corners], planes, axis=1) / metres
+    mesh.uv_layers.new(name="UVMap").data.foreach_set("uv", uv.astype(np.float32).ravel())
+    return obj
+
+
 def lamp(name: str, kind: str, location, energy: float, color=(1.0, 1.0, 1.0), target=None, **settings) -> bpy.types.Object:
     """A lamp of Blender's ``kind`` (POINT, SPOT, AREA, SUN) looking at ``target``; ``settings`` are set on its data."""
     data = bpy.data.lights.new(name, kind)

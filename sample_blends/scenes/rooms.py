@@ -83,7 +83,7 @@ def two_rooms():
 
 
 def corridor_door_ajar():
-    """A bright room, a dark corridor and a door ajar by 20 degrees: nearly all light in the corridor has come through a
+    """A bright room, a dark corridor and a door ajar by 28 degrees: nearly all light in the corridor has come through a
     narrow gap, over floor and ceiling that run on under the wall."""
     plaster = kit.material("Plaster", (0.7, 0.7, 0.68))
     floor = kit.material("Floor", (0.35, 0.24, 0.16))
@@ -99,8 +99,8 @@ def corridor_door_ajar():
             ("Lintel", (-0.5, 0.001, 2.05), (0.5, 0.099, 2.55))):
         kit.box(name, low, high, plaster)
     leaf = kit.mesh_object("Door", kit.box_vertices((0.0, -0.02, 0.005), (0.89, 0.02, 2.04)), kit.BOX_FACES.values(), door)
-    leaf.location, leaf.rotation_euler = (-0.445, 0.05, 0.0), (0.0, 0.0, math.radians(20.0))
-    kit.lamp("Room Lamp", "AREA", (0.4, 2.0, 2.45), 220.0, (1.0, 0.92, 0.8), shape="DISK", size=0.6)
+    leaf.location, leaf.rotation_euler = (-0.445, 0.05, 0.0), (0.0, 0.0, math.radians(28.0))
+    kit.lamp("Room Lamp", "AREA", (0.4, 2.0, 2.45), 500.0, (1.0, 0.92, 0.8), shape="DISK", size=0.6)
     kit.probe_volume("Probes", (-3.0, -1.2, 0.0), (3.0, 4.0, 2.5), (8, 7, 3))
     kit.camera((2.4, -1.0, 1.6), (-0.6, 0.05, 1.1), lens=20.0)
 
