@@ -44,7 +44,7 @@ class World:
     """The radiance of the surroundings [W·sr⁻¹·m⁻²].
 
     ``equirect`` (h, w, 3) float32 in Blender's equirectangular layout with row 0 at the bottom (−Z): with d = ``map_from_world``·
-    direction_world, u = atan2(d.y, −d.x)/2π + ½ and v = atan2(d.z, hypot(d.x, d.y))/π + ½ (Cycles `projection.h`,
+    direction_world, u = ½ − atan2(d.y, d.x)/2π and v = atan2(d.z, hypot(d.x, d.y))/π + ½ (Cycles `projection.h`,
     direction_to_equirectangular). A (1, 1, 3) map is a constant. ``map_from_world`` is a (3, 3) rotation.
     """
 
