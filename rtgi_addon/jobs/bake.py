@@ -1,0 +1,94 @@
+"""From a Scene to a finished bundle: the one bake that the shell, the module and the panel share."""
+
+from dataclasses import asdict, replace
+
+import numpy as np
+
+from .. import techniques
+from ..errors import BakeError, UsageError
+from ..exchange.bundle import check_target, write_bundle
+from ..progress import Progress
+from ..scene import ProbeVolume, Scene
+from ..scene.checks import check_scene
+from .checkpoint import FileCheckpoint
+from .fingerprint import fingerprint
+from .memory import peak_memory_bytes
+from .report import BakeSummary, summarize
+from .settings import build_settings
+
+
+def bake_scene(scene: Scene, technique: str = "probes", overrides: dict | None = None, out="bake", *, seed: int = 0,
+               threads: int | None = None, progress: Progress | None = None, resume: bool = False, volume=None,
+               checkpoint_seconds: float = 10.0, device: str = "cpu") -> BakeSummary:
+    """Bake the volumes of ``scene`` with the technique called ``technique`` into the bundle ``out``.
+
+    ``overrides`` maps names of the technique's settings to values and wins over what a volume itself carries; ``volume`` is
+    None (all of them), a name or several. The same scene, settings and seed give the same bytes for any ``threads``
+    (None = every core), interrupted and continued with ``resume`` or not. A checkpoint is left in `OUT.partial` at most every
+    ``checkpoint_seconds`` and removed once the bundle is written.
+
+    Raises BakeError for what the user can mend and Cancelled once ``progress.cancel`` was called: the bundle that was at
+    ``out`` before is then as it was. Any other exception of the technique goes through unchanged, with the same promise.
+    """
+    progress = progress or Progress()
+    overrides = overrides or {}
+    method = techniques.get(technique)
+    settings = build_settings(method, overrides)
+    _require_device(method, device)
+    target = check_target(out)
+
+    progress.stage("check")
+    progress.step(0.0, "Checking the scene")
+    scene = replace(scene, volumes=_select(scene.volumes, volume, overrides))
+    warnings = _preflight(scene)
+
+    checkpoint = FileCheckpoint(target, fingerprint(scene, technique, settings, seed), resume=resume, interval=checkpoint_seconds)
+    try:
+        progress.stage("bake")
+        field = method.bake(scene, settings, np.random.default_rng(seed), progress.span(0.02, 0.97), threads=threads,
+                            checkpoint=checkpoint)
+        progress.stage("write")
+        progress.step(0.97, f"Writing {target.name}")
+        write_bundle(target, field, scene, settings=asdict(settings), seed=seed, notes=[*scene.notes, *warnings],
+                     stats=lambda: _stats(field, progress))
+    except BaseException:
+        checkpoint.remove_if_empty()
+        raise
+    checkpoint.remove()
+    progress.step(1.0, "Done")
+    return summarize(field, scene, out=target, technique=technique, settings=asdict(settings), seed=seed, warnings=warnings,
+                     resumed=checkpoint.resumed, stats=_stats(field, progress))
+
+
+def _require_device(method: techniques.Technique, device: str) -> None:
+    devices = getattr(method, "devices", ("cpu",))
+    if device not in devices:
+        raise BakeError(f"technique {method.name!r} does not bake on the device {device!r}",
+                        f"use --device {' or '.join(devices)}")
+
+
+def _select(volumes: tuple[ProbeVolume, ...], wanted, overrides: dict) -> tuple[ProbeVolume, ...]:
+    """The volumes called ``wanted``, in the scene's order, with their own settings where no override replaces them."""
+    if wanted is not None:
+        wanted = [wanted] if isinstance(wanted, str) else list(wanted)
+        known = [volume.name for volume in volumes]
+        for name in wanted:
+            if name not in known:
+                raise UsageError(f"unknown volume {name!r}", f"choose one of {', '.join(known) or '(the scene has none)'}")
+        volumes = tuple(volume for volume in volumes if volume.name in wanted)
+    return tuple(replace(volume, settings={name: value for name, value in volume.settings.items() if name not in overrides})
+                 for volume in volumes)
+
+
+def _preflight(scene: Scene) -> list[str]:
+    """Check the scene before a ray is shot; returns the warnings. Raises BakeError for the first error found."""
+    findings = check_scene(scene)
+    for finding in findings:
+        if finding.severity == "error":
+            raise BakeError(finding.cause, finding.remedy)
+    return [f"{finding.cause}: {finding.remedy}" for finding in findings]
+
+
+def _stats(field: techniques.Field, progress: Progress) -> dict:
+    seconds = progress.finish()
+    return {"rays": 0, **field.stats, "seconds": seconds, "peak_memory_bytes": peak_memory_bytes()}
