@@ -152,7 +152,8 @@ def main() -> None:
     if not (tree / "usr/bin").exists():
         sys.exit(f"{tree} is no Debian tree: make it with `{Path(sys.argv[0]).name} create {tree}`")
     binds = (REPOSITORY, *(path.resolve() for path in arguments.bind))
-    sys.exit(subprocess.run(command_in(tree, line, binds, dict(item.split("=", 1) for item in arguments.env)), check=False).returncode)
+    environment = dict(item.split("=", 1) for item in arguments.env)
+    sys.exit(subprocess.run(command_in(tree, line, binds, environment), check=False).returncode)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,260 @@
+"""Where the user finds it: settings in the render properties and on the probe volume, actions in the 3D view's sidebar."""
+
+import textwrap
+from dataclasses import fields
+from pathlib import Path
+
+import bpy
+
+from ..techniques import registry
+from . import dependencies
+from .properties import GOALS, attribute, has_goal, value_type
+from .session import session
+from .worker import duration
+
+_ICONS = {"error": "CANCEL", "warning": "ERROR", "note": "INFO"}
+
+
+def draw_lines(layout, text: str, width: int, icon: str = "NONE") -> None:
+    """``text`` over as many labels as a region of ``width`` pixels needs; the icon stands before the first."""
+    characters = max(int((width - 60) / (7.2 * bpy.context.preferences.system.ui_scale)), 24)
+    column = layout.column(align=True)
+    column.scale_y = 0.8
+    for number, line in enumerate(textwrap.wrap(text, characters) or [""]):
+        column.label(text=line, icon=icon if number == 0 else ("NONE" if icon == "NONE" else "BLANK1"))
+
+
+def draw_missing(layout, width: int) -> bool:
+    """Say which packages this Blender lacks; True if a bake cannot run without them."""
+    packages = dependencies.missing()
+    required = [package for package in packages if package.required]
+    shown = required or packages
+    if shown:
+        box = layout.box()
+        box.alert = bool(required)
+        for package in shown:
+            draw_lines(box, f"{package.module} is missing ({package.purpose})", width, "ERROR" if required else "INFO")
+        draw_lines(box, dependencies.remedy(shown).capitalize(), width)
+    return bool(required)
+
+
+def draw_actions(layout, context, width: int) -> None:
+    """The Bake button, or the bake's progress with the button that stops it."""
+    if not session.running:
+        row = layout.row()
+        row.scale_y = 1.5
+        row.operator("rtgi.bake", icon="LIGHTPROBE_VOLUME")
+        error = session.errors.get(context.scene.name)
+        if error:
+            box = layout.box()
+            box.alert = True
+            draw_lines(box, error, width, "CANCEL")
+        return
+    report = session.worker.report
+    stopping = session.worker.progress.cancelled
+    column = layout.column(align=True)
+    row = column.row(align=True)
+    row.scale_y = 1.5
+    left = "" if report.seconds_left is None else f"  ·  {duration(report.seconds_left)} left"
+    row.progress(factor=report.fraction, type="BAR", text="Cancelling…" if stopping else f"{100 * report.fraction:.0f}%{left}")
+    button = row.row(align=True)
+    button.enabled = not stopping
+    button.operator("rtgi.cancel", text="", icon="CANCEL")
+    status = report.label if session.baking == context.scene.name else f"{session.baking}: {report.label}"
+    layout.label(text=status or "Starting", icon="TIME")
+
+
+def draw_volumes(layout, context, width: int) -> None:
+    """How many probes the scene's volumes have, or that there are none and what will happen."""
+    volumes = [obj for obj in context.scene.objects
+               if obj.type == "LIGHT_PROBE" and obj.data.type == "VOLUME" and not obj.hide_render]
+    if not volumes:
+        draw_lines(layout, "No Light Probe Volume: one will be fitted to the scene", width, "INFO")
+        layout.operator("rtgi.fit_volume", icon="ADD")
+        return
+    count = sum(obj.data.resolution_x * obj.data.resolution_y * obj.data.resolution_z for obj in volumes)
+    names = volumes[0].name if len(volumes) == 1 else f"{len(volumes)} volumes"
+    layout.label(text=f"{names}: {count:,} probes", icon="OUTLINER_OB_LIGHTPROBE")
+
+
+def draw_setting(layout, group, technique, item, toggle: str | None = None) -> None:
+    """One setting in a split layout; ``toggle`` names the property that switches it on."""
+    if toggle is None and value_type(technique, item.name)[1] and item.name not in GOALS:
+        toggle = f"use_{item.name}"
+    if toggle is None:
+        layout.prop(group, item.name)
+        return
+    row = layout.row(heading=item.metadata["label"])
+    row.prop(group, toggle, text="")
+    value = row.row()
+    value.active = getattr(group, toggle)
+    value.prop(group, item.name, text="")
+
+
+class RTGI_PT_render(bpy.types.Panel):
+    """Settings of the scene's bake."""
+
+    bl_label = "RTGI"
+    bl_idname = "RTGI_PT_render"
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "render"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        """Technique, when to stop, the technique's own settings."""
+        layout, settings = self.layout, context.scene.rtgi
+        width = context.region.width
+        draw_missing(layout, width)
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        column = layout.column()
+        column.enabled = not session.running
+        technique = registry()[settings.technique]
+        group = getattr(settings, attribute(technique.name))
+        column.prop(settings, "technique")
+        if has_goal(technique):
+            column.row().prop(settings, "mode", expand=True)
+            column.prop(group, "error" if settings.mode == "ERROR" else "rays")
+        for item in fields(technique.Settings):
+            if not (has_goal(technique) and item.name in GOALS):
+                draw_setting(column, group, technique, item)
+
+
+class RTGI_PT_render_output(bpy.types.Panel):
+    """Where the bake goes."""
+
+    bl_label = "Output"
+    bl_parent_id = "RTGI_PT_render"
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "render"
+
+    def draw(self, context):
+        """Folder, seed and the button."""
+        layout, settings = self.layout, context.scene.rtgi
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        column = layout.column()
+        column.enabled = not session.running
+        column.prop(settings, "output", text="Folder")
+        column.prop(settings, "seed")
+        draw_actions(layout, context, context.region.width)
+
+
+class RTGI_PT_volume(bpy.types.Panel):
+    """What one Light Probe Volume does differently."""
+
+    bl_label = "RTGI Overrides"
+    bl_idname = "RTGI_PT_volume"
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "data"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        """Light Probe Volumes only, in any engine."""
+        probe = getattr(context, "lightprobe", None)
+        return probe is not None and probe.type == "VOLUME"
+
+    def draw(self, context):
+        """Every setting with a switch before it."""
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        technique = registry()[context.scene.rtgi.technique]
+        group = getattr(context.lightprobe.rtgi, attribute(technique.name))
+        column = layout.column()
+        column.enabled = not session.running
+        for item in fields(technique.Settings):
+            draw_setting(column, group, technique, item, toggle=f"override_{item.name}")
+
+
+class RTGI_PT_bake(bpy.types.Panel):
+    """The actions, and what is baked."""
+
+    bl_label = "Light Probes"
+    bl_idname = "RTGI_PT_bake"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "RTGI"
+
+    def draw(self, context):
+        """Volumes, Bake or its progress."""
+        width = context.region.width
+        blocked = draw_missing(self.layout, width)
+        draw_volumes(self.layout, context, width)
+        column = self.layout.column()
+        column.enabled = not blocked
+        draw_actions(column, context, width)
+
+
+class RTGI_PT_last_bake(bpy.types.Panel):
+    """What is baked, how good it is, and whether it still holds."""
+
+    bl_label = "Last Bake"
+    bl_parent_id = "RTGI_PT_bake"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "RTGI"
+
+    def draw(self, context):
+        """The figures of the last bake."""
+        layout, last = self.layout, context.scene.rtgi.last_bake
+        if not last.folder:
+            layout.label(text="Nothing baked yet", icon="INFO")
+            return
+        width = context.region.width
+        if session.stale.get(context.scene.name):
+            draw_lines(layout, "The scene or its settings have changed since", width, "ERROR")
+        folder = Path(last.folder)
+        figures = [
+            ("Probes", f"{last.probes:,}"),
+            ("Usable", f"{100 * last.usable:.1f}%"),
+            ("Estimated Error", f"{100 * last.error:.2g}%" if last.error >= 0 else "unknown"),
+            ("Time", duration(last.seconds)),
+        ]
+        column = layout.column(align=True)
+        for name, value in figures:
+            row = column.split(factor=0.5)
+            row.label(text=name)
+            row.label(text=value)
+        row = layout.row(align=True)
+        row.label(text=folder.name, icon="FILE_FOLDER")
+        row.operator("rtgi.open_folder", text="", icon="FILEBROWSER")
+
+
+class RTGI_PT_checks(bpy.types.Panel):
+    """What would spoil a bake."""
+
+    bl_label = "Checks"
+    bl_parent_id = "RTGI_PT_bake"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "RTGI"
+
+    def draw(self, context):
+        """Findings of the last reading; drawing reads nothing itself."""
+        layout = self.layout
+        findings = session.findings.get(context.scene.name)
+        for finding in findings or ():
+            draw_lines(layout, finding.text, context.region.width, _ICONS[finding.severity])
+        if findings is not None and not findings:
+            layout.label(text="Nothing to report", icon="CHECKMARK")
+        layout.operator("rtgi.check", icon="VIEWZOOM")
+
+
+_CLASSES = (RTGI_PT_render, RTGI_PT_render_output, RTGI_PT_volume, RTGI_PT_bake, RTGI_PT_last_bake, RTGI_PT_checks)
+
+
+def register() -> None:
+    """Register the panels."""
+    for cls in _CLASSES:
+        bpy.utils.register_class(cls)
+
+
+def unregister() -> None:
+    """Take them out."""
+    for cls in reversed(_CLASSES):
+        bpy.utils.unregister_class(cls)

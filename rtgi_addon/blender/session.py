@@ -1,0 +1,61 @@
+"""What this run of Blender knows about baking and no file should: the bake under way, findings, which bakes are out of date.
+
+Everything is kept by scene name, because datablocks do not survive undo.
+"""
+
+from dataclasses import dataclass, field
+
+import bpy
+
+from .worker import BakeWorker
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A line for the panel. ``severity`` is 'error', 'warning' or 'note'."""
+
+    severity: str
+    text: str
+
+
+@dataclass
+class Session:
+    """``worker`` is the latest bake, which may have ended; ``baking`` names its scene while it runs.
+
+    By scene name: ``findings`` of its last reading (absent before the first); ``errors``, why the last attempt failed;
+    ``digests`` of the scene as it was last read; ``records``, what was written to ``Scene.rtgi.last_bake`` in this session;
+    ``stale``, whether it differs from its last bake.
+    """
+
+    worker: BakeWorker | None = None
+    baking: str = ""
+    findings: dict[str, list[Finding]] = field(default_factory=dict)
+    errors: dict[str, str] = field(default_factory=dict)
+    digests: dict[str, str] = field(default_factory=dict)
+    records: dict[str, dict] = field(default_factory=dict)
+    stale: dict[str, bool] = field(default_factory=dict)
+
+    @property
+    def running(self) -> bool:
+        """True while a bake is under way."""
+        return self.worker is not None and self.worker.running
+
+    def forget_scenes(self) -> None:
+        """Another file is about to be opened: stop the bake and drop all that was known of the old one's scenes."""
+        if self.worker is not None:
+            self.worker.cancel()
+        self.baking = ""
+        for known in (self.findings, self.errors, self.digests, self.records, self.stale):
+            known.clear()
+
+
+session = Session()
+
+
+def redraw() -> None:
+    """Draw the editors again that show a bake."""
+    for manager in bpy.data.window_managers:
+        for window in manager.windows:
+            for area in window.screen.areas:
+                if area.type in {"VIEW_3D", "PROPERTIES"}:
+                    area.tag_redraw()

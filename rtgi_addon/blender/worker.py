@@ -1,0 +1,115 @@
+"""A bake on a worker thread, watched from Blender's main thread. Nothing here touches Blender."""
+
+import queue
+import threading
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from ..errors import BakeError, Cancelled
+from ..progress import Progress
+
+
+@dataclass(frozen=True)
+class Report:
+    """Where the bake stands: ``fraction`` 0 to 1, what it does, and the seconds left (None while unknown)."""
+
+    fraction: float = 0.0
+    label: str = ""
+    seconds_left: float | None = None
+
+    @property
+    def text(self) -> str:
+        """One line for a status bar: share done, step, time left."""
+        parts = [f"{100.0 * self.fraction:.0f}%"]
+        if self.label:
+            parts.insert(0, self.label)
+        if self.seconds_left is not None:
+            parts.append(f"{duration(self.seconds_left)} left")
+        return ", ".join(parts)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a bake ended: ``summary`` of the finished bundle, or ``error`` as one line, or neither when it was cancelled."""
+
+    summary: dict | None = None
+    error: str = ""
+
+    @property
+    def cancelled(self) -> bool:
+        """True if the user stopped it."""
+        return self.summary is None and not self.error
+
+
+class BakeWorker:
+    """Runs ``bake(progress) -> summary`` in this thread (``run``) or in one of its own (``start``, then ``poll``)."""
+
+    def __init__(self, bake: Callable[[Progress], dict], on_report: Callable[[Report], None] | None = None):
+        self._bake = bake
+        self._on_report = on_report
+        self._reports: queue.SimpleQueue[Report] = queue.SimpleQueue()
+        self._thread: threading.Thread | None = None
+        self.progress = Progress(self._put)
+        self.report = Report()
+        self.outcome: Outcome | None = None
+
+    def run(self) -> Outcome:
+        """Bake here and now; exceptions become an ``Outcome``."""
+        try:
+            self.outcome = Outcome(summary=self._bake(self.progress))
+        except Cancelled:
+            self.outcome = Outcome()
+        except BakeError as error:
+            self.outcome = Outcome(error=str(error))
+        except MemoryError:
+            self.outcome = Outcome(error="the bake ran out of memory: use fewer probes or a lower SH order")
+        except Exception as error:
+            traceback.print_exc()
+            first_line = (str(error).splitlines() or [""])[0]
+            self.outcome = Outcome(error=f"the bake failed with {type(error).__name__}: {first_line} (details in the console)")
+        return self.outcome
+
+    def start(self) -> None:
+        """Bake on a thread of its own. A daemon, so that quitting Blender never waits for rays."""
+        self._thread = threading.Thread(target=self.run, name="rtgi bake", daemon=True)
+        self._thread.start()
+
+    def poll(self) -> bool:
+        """Take in what the thread has reported since; True while it is at work. For the main thread."""
+        running = self.running
+        while not self._reports.empty():
+            self.report = self._reports.get()
+        return running
+
+    @property
+    def running(self) -> bool:
+        """True while the thread is at work."""
+        return self._thread is not None and self._thread.is_alive()
+
+    def cancel(self) -> None:
+        """Ask the bake to stop at its next step."""
+        self.progress.cancel()
+
+    def join(self, timeout: float) -> bool:
+        """Wait up to ``timeout`` seconds for the thread; True once it has ended."""
+        if self._thread is not None:
+            self._thread.join(timeout)
+        return not self.running
+
+    def _put(self, fraction: float, label: str, seconds_left: float | None) -> None:
+        report = Report(fraction, label, seconds_left)
+        if self._on_report is None:
+            self._reports.put(report)
+        else:
+            self._on_report(report)
+
+
+def duration(seconds: float) -> str:
+    """``seconds`` as a person reads it: 8 s, 2 min 05 s, 1 h 10 min."""
+    whole = max(round(seconds), 0)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60:02d} s"
+    return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
