@@ -1,0 +1,1 @@
+"""SH irradiance probes on lattices (radiance field caching): bake, lookup, reconstruction."""
