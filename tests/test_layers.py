@@ -20,7 +20,8 @@ LEAVES = {"errors", "progress"}
 
 # Who may import what from outside; numpy and the standard library are everybody's.
 OWNERS = {
-    "bpy": {"blender"}, "bpy_extras": {"blender"}, "bmesh": {"blender"}, "addon_utils": {"blender"}, "bpy_types": {"blender"},
+    "bpy": {"blender"}, "_cycles": {"blender"}, "bpy_extras": {"blender"}, "bmesh": {"blender"}, "addon_utils": {"blender"},
+    "bpy_types": {"blender"},
     "mathutils": {"blender", "transport"}, "gpu": {"preview"}, "gpu_extras": {"preview"}, "blf": {"preview"},
     "matplotlib": {"evaluate"}, "OpenEXR": {"exchange"}, "embreex": {"transport"},
 }

@@ -39,8 +39,13 @@ class Finding:
     message: str
     remedy: str
 
+    @property
+    def cause(self) -> str:
+        """What is wrong and where, as BakeError has it."""
+        return f"{self.object}: {self.message}"
+
     def __str__(self) -> str:
-        return f"{self.object}: {self.message}: {self.remedy}"
+        return f"{self.cause}: {self.remedy}"
 
 
 def check_scene(scene: Scene, *, sh_order: int = 2, memory_bytes: int | None = None) -> list[Finding]:
@@ -55,7 +60,7 @@ def require(findings: Iterable[Finding]) -> None:
     errors = [finding for finding in findings if finding.severity == "error"]
     if errors:
         more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
-        raise BakeError(f"{errors[0].object}: {errors[0].message}{more}", errors[0].remedy)
+        raise BakeError(f"{errors[0].cause}{more}", errors[0].remedy)
 
 
 def _used_meshes(scene: Scene) -> dict[int, str]:
