@@ -1,15 +1,16 @@
 """From a Scene to a finished bundle: the one bake that the shell, the module and the panel share."""
 
+import contextlib
 from dataclasses import asdict, replace
 
 import numpy as np
 
 from .. import techniques
-from ..errors import BakeError, UsageError
+from ..errors import BakeError, Cancelled, UsageError
 from ..exchange.bundle import check_target, write_bundle
 from ..progress import Progress
 from ..scene import ProbeVolume, Scene
-from ..scene.checks import check_scene
+from ..scene.checks import check_scene, require
 from .checkpoint import FileCheckpoint
 from .fingerprint import fingerprint
 from .memory import peak_memory_bytes
@@ -17,12 +18,13 @@ from .report import BakeSummary, summarize
 from .settings import build_settings
 
 
-def bake_scene(scene: Scene, technique: str = "probes", overrides: dict | None = None, out="bake", *, seed: int = 0,
-               threads: int | None = None, progress: Progress | None = None, resume: bool = False, volume=None,
-               checkpoint_seconds: float = 10.0, device: str = "cpu") -> BakeSummary:
+def bake_scene(scene: Scene, technique: str = "probes", overrides: dict | None = None, out="bake", *,
+               base: dict | None = None, seed: int = 0, threads: int | None = None, progress: Progress | None = None,
+               resume: bool = False, volume=None, checkpoint_seconds: float = 10.0, device: str = "cpu") -> BakeSummary:
     """Bake the volumes of ``scene`` with the technique called ``technique`` into the bundle ``out``.
 
-    ``overrides`` maps names of the technique's settings to values and wins over what a volume itself carries; ``volume`` is
+    ``overrides`` maps names of the technique's settings to values and wins over what a volume itself carries, which wins over
+    ``base`` (the scene's own settings, as a panel holds them), which wins over the technique's defaults. ``volume`` is
     None (all of them), a name or several. The same scene, settings and seed give the same bytes for any ``threads``
     (None = every core), interrupted and continued with ``resume`` or not. A checkpoint is left in `OUT.partial` at most every
     ``checkpoint_seconds`` and removed once the bundle is written.
@@ -33,14 +35,16 @@ def bake_scene(scene: Scene, technique: str = "probes", overrides: dict | None =
     progress = progress or Progress()
     overrides = overrides or {}
     method = techniques.get(technique)
-    settings = build_settings(method, overrides)
+    settings = build_settings(method, {**(base or {}), **overrides})
     _require_device(method, device)
     target = check_target(out)
 
     progress.stage("check")
     progress.step(0.0, "Checking the scene")
     scene = replace(scene, volumes=_select(scene.volumes, volume, overrides))
-    warnings = _preflight(scene)
+    findings = check_scene(scene, sh_order=getattr(settings, "order", 2))
+    require(findings)
+    warnings = [str(finding) for finding in findings]
 
     checkpoint = FileCheckpoint(target, fingerprint(scene, technique, settings, seed), resume=resume, interval=checkpoint_seconds)
     try:
@@ -55,7 +59,9 @@ def bake_scene(scene: Scene, technique: str = "probes", overrides: dict | None =
         checkpoint.remove_if_empty()
         raise
     checkpoint.remove()
-    progress.step(1.0, "Done")
+    # The bundle is written: a wish to stop that comes only now is too late.
+    with contextlib.suppress(Cancelled):
+        progress.step(1.0, "Done")
     return summarize(field, scene, out=target, technique=technique, settings=asdict(settings), seed=seed, warnings=warnings,
                      resumed=checkpoint.resumed, stats=_stats(field, progress))
 
@@ -78,15 +84,6 @@ def _select(volumes: tuple[ProbeVolume, ...], wanted, overrides: dict) -> tuple[
         volumes = tuple(volume for volume in volumes if volume.name in wanted)
     return tuple(replace(volume, settings={name: value for name, value in volume.settings.items() if name not in overrides})
                  for volume in volumes)
-
-
-def _preflight(scene: Scene) -> list[str]:
-    """Check the scene before a ray is shot; returns the warnings. Raises BakeError for the first error found."""
-    findings = check_scene(scene)
-    for finding in findings:
-        if finding.severity == "error":
-            raise BakeError(finding.cause, finding.remedy)
-    return [f"{finding.cause}: {finding.remedy}" for finding in findings]
 
 
 def _stats(field: techniques.Field, progress: Progress) -> dict:

@@ -1,0 +1,45 @@
+"""What a subcommand is."""
+
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from ...progress import Progress
+from ...scene import Scene
+
+# The share of a command's progress that reading the file is given.
+EXTRACT_SHARE = 0.05
+
+
+class Report(Protocol):
+    """A subcommand's result: ``to_json()`` is printed by `--json`, ``to_text()`` without."""
+
+    def to_json(self) -> dict:
+        """The result as JSON-able values."""
+
+    def to_text(self) -> str:
+        """The result as lines for a person."""
+
+
+@dataclass(frozen=True)
+class Session:
+    """What a door hands to a subcommand: ``progress`` to report to and be cancelled by, and ``read_scene`` which opens the
+    FILE (or takes the one that is open) and extracts it. Only ``read_scene`` touches Blender."""
+
+    progress: Progress
+    read_scene: Callable[[], Scene]
+
+
+@dataclass(frozen=True)
+class Subcommand:
+    """One entry of the command line. ``takes_scene`` says that it works on a FILE; ``add_arguments`` declares its options;
+    ``check`` (optional) raises UsageError for options that contradict each other or a technique, before anything is opened;
+    ``run`` does the work."""
+
+    name: str
+    help: str
+    takes_scene: bool
+    add_arguments: Callable[[ArgumentParser], None]
+    run: Callable[[Namespace, Session], Report]
+    check: Callable[[Namespace], None] | None = None

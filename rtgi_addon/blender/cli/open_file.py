@@ -1,0 +1,84 @@
+"""Getting a scene into Blender: a .blend, a glTF file, or what is open already."""
+
+import re
+from pathlib import Path
+
+import bpy
+
+from ...errors import BakeError
+
+_GLTF = (".glb", ".gltf")
+
+
+def open_file(name: str) -> None:
+    """Open a .blend, or import a .glb or .gltf into an empty file. Raises BakeError for a file that is missing, damaged, of a
+    newer Blender or of another kind."""
+    path = _existing(name)
+    if path.suffix.lower() in _GLTF:
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        _import_gltf(path)
+    elif path.suffix.lower().startswith(".blend"):
+        _open_blend(path)
+    else:
+        raise BakeError(f"{path} is neither a .blend nor a .glb or .gltf", "convert it, or correct the path")
+
+
+def take_open_file(imported: str | None) -> None:
+    """Take the file that Blender was started with, and import the glTF file ``imported`` into it, or in place of the startup
+    scene if there is none. Raises BakeError if there is neither."""
+    if not bpy.data.filepath:
+        # Blender goes on with its startup scene after a FILE that it could not read.
+        if imported is None:
+            raise BakeError("no .blend is open, Blender was started without one or could not read it",
+                            "name an existing file before --command, or give --import FILE.glb")
+        bpy.data.batch_remove(list(bpy.data.objects))
+        bpy.context.scene.world = None
+    else:
+        _require_known_version(Path(bpy.data.filepath))
+    if imported is not None:
+        _import_gltf(_existing(imported))
+
+
+def _existing(name: str) -> Path:
+    path = Path(name).expanduser().resolve()
+    if not path.exists():
+        raise BakeError(f"there is no file {path}", "correct the path")
+    if not path.is_file():
+        raise BakeError(f"{path} is not a file", "correct the path")
+    return path
+
+
+def _open_blend(path: Path) -> None:
+    try:
+        bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False, use_scripts=False)
+    except RuntimeError as error:
+        raise BakeError(f"{path} is not a .blend that Blender {bpy.app.version_string} can read, {_reason(error)}",
+                        "restore it from a backup, or save it again with the Blender that made it") from error
+    _require_known_version(path)
+
+
+def _require_known_version(path: Path) -> None:
+    """Blender opens files of newer versions and drops what it does not know: their bakes would be silently wrong."""
+    saved, running = tuple(bpy.data.version[:2]), tuple(bpy.app.version[:2])
+    if saved > running:
+        raise BakeError(f"{path} was saved by Blender {saved[0]}.{saved[1]}, newer than this Blender {running[0]}.{running[1]}",
+                        f"bake with Blender {saved[0]}.{saved[1]} or later")
+
+
+def _import_gltf(path: Path) -> None:
+    if path.suffix.lower() not in _GLTF:
+        raise BakeError(f"{path} is not a .glb or .gltf", "correct the path")
+    try:
+        bpy.ops.import_scene.gltf(filepath=str(path))
+    except RuntimeError as error:
+        raise BakeError(f"{path} is not glTF that Blender can import, {_reason(error)}",
+                        "export it again, or import it in Blender and save a .blend") from error
+
+
+def _reason(error: RuntimeError) -> str:
+    """Blender's own reason without its prefixes and the path, which the message names already."""
+    text = str(error).strip().splitlines()[-1].removeprefix("Error: ")
+    text = re.sub(r"""^Loading ["'].*?["'] failed: """, "", text)
+    text = re.sub(r"""^Failed to read blend file ["'].*["']: """, "", text)
+    text = re.sub(r""" in file ["'].*["']$""", "", text)
+    return text[:1].lower() + text[1:].rstrip(".")
