@@ -1,0 +1,210 @@
+"""Texels on arbitrary triangles: where the surface cache keeps its values.
+
+A large triangle carries a grid along its two shorter edges; small triangles share texels with their neighbours in space that
+face the same way. Cells grow with the distance from the probes, as √(1+(x/w)²), so that a kilometre of ground costs a few
+hundred of them. Each texel has two sides. Slots number every texel there could be; only those that rays reach are used.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .geometry import Geometry
+
+# Slots are addressed by a dense map of this many 32-bit entries at most (both sides): coarser texels beyond.
+MAX_SLOTS = 1 << 24
+
+
+@dataclass(frozen=True, eq=False)
+class Focus:
+    """Where accuracy is wanted: ``center_world`` (3,) and ``radius`` [m] of a sphere around the probes, within which texels have
+    their nominal ``size`` [m]; outside it they grow in proportion to the distance."""
+
+    center_world: np.ndarray
+    radius: float
+    size: float
+
+
+class TexelLayout:
+    """Maps hits to slots and slots back to points on the surface.
+
+    Raises nothing: when ``focus.size`` would need more than MAX_SLOTS slots it is doubled until they fit; ``size`` says what
+    was used.
+    """
+
+    def __init__(self, geometry: Geometry, focus: Focus):
+        self._geometry = geometry
+        corners = geometry.triangles_world
+        # The corner opposite the longest edge: the grid runs along the two shorter edges from there.
+        lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+        self._corner = ((np.argmax(lengths, axis=1) + 2) % 3).astype(np.int8)
+        rows = np.arange(geometry.count)
+        self._origin = corners[rows, self._corner]
+        self._edge_a = corners[rows, (self._corner + 1) % 3] - self._origin
+        self._edge_b = corners[rows, (self._corner + 2) % 3] - self._origin
+        self.size = float(focus.size)
+        while not self._grid(focus):
+            self.size *= 2.0
+
+    def _grid(self, focus: Focus) -> bool:
+        width = np.float32(max(focus.radius, 1e-12) + 8.0 * self.size)
+        self._width = width
+        center = np.asarray(focus.center_world, np.float32)
+        corners = self._geometry.triangles_world
+        gap = np.maximum(np.maximum(corners.min(axis=1) - center, center - corners.max(axis=1)), 0)
+        distance = np.sqrt(np.einsum("ij,ij->i", gap, gap))
+        size = self.size * np.sqrt(1.0 + (distance / width) ** 2)
+        self._axis_a = _Axis(self._edge_a, self._origin, center, width, size)
+        self._axis_b = _Axis(self._edge_b, self._origin, center, width, size)
+        cells = self._axis_a.cells.astype(np.int64) * self._axis_b.cells
+        shared = (cells == 1) | (self._geometry.areas < 0.5 * size**2)
+        group, group_count = self._cluster(np.flatnonzero(shared), size)
+        own = np.where(shared, 0, cells)
+        total = group_count + int(own.sum())
+        if 2 * total > MAX_SLOTS and self.size < 1e6 * max(focus.radius, focus.size):
+            return False
+        self._base = group_count + np.cumsum(own) - own
+        self._base[shared] = group
+        self._shared = shared
+        self._stride = np.where(shared, 0, self._axis_b.cells).astype(np.int32)
+        self._axis_a.cells[shared] = 1
+        self._axis_b.cells[shared] = 1
+        self._any_warp = bool(np.any(self._axis_a.warped & ~shared) or np.any(self._axis_b.warped & ~shared))
+        self._group_count = group_count
+        self._own_triangles = np.flatnonzero(~shared)
+        self._own_starts = self._base[self._own_triangles]
+        self.slot_count = 2 * total
+        self._base = self._base.astype(np.int32)
+        return True
+
+    def _cluster(self, triangles: np.ndarray, size: np.ndarray) -> tuple[np.ndarray, int]:
+        """Group small triangles by cell in space, facing and material; remember each group's members for sampling."""
+        if triangles.size == 0:
+            self._members, self._member_cdf = triangles, np.zeros(1)
+            self._group_starts = np.zeros(1, np.int64)
+            return triangles, 0
+        corners = self._geometry.triangles_world[triangles]
+        level = np.round(np.log2(size[triangles] / self.size)).astype(np.int64)
+        cell = np.floor(corners.mean(axis=1) / (self.size * 2.0**level)[:, None]).astype(np.int64)
+        normal = self._geometry.normals_world[triangles]
+        # 26 facings: each axis is −, 0 or + of the rounded normal.
+        facing = np.rint(normal * 1.2).astype(np.int64) @ np.array([1, 3, 9]) + 13
+        key = facing + 32 * self._geometry.material[triangles].astype(np.int64)
+        with np.errstate(over="ignore"):
+            for part in (cell[:, 0], cell[:, 1], cell[:, 2], level):
+                key = (key ^ part) * np.int64(-7046029254386353131)
+                key ^= key >> np.int64(29)
+        _, group = np.unique(key, return_inverse=True)
+        group = group.reshape(-1)
+        order = np.argsort(group, kind="stable")
+        self._members = triangles[order]
+        areas = self._geometry.areas[self._members].astype(np.float64)
+        self._member_cdf = np.concatenate(([0.0], np.cumsum(np.maximum(areas, 1e-30))))
+        self._group_starts = np.concatenate((np.flatnonzero(np.diff(group[order], prepend=-1)), [len(order)]))
+        return group, len(self._group_starts) - 1
+
+    def slots(self, primitive: np.ndarray, u: np.ndarray, v: np.ndarray, front: np.ndarray) -> np.ndarray:
+        """Slot (n,) int32 of hits at Embree barycentrics on the ``front`` (n,) bool side."""
+        corner = self._corner[primitive]
+        w = 1.0 - u - v
+        # (a, b) are the barycentric weights of the two corners that follow the grid's own.
+        a = np.where(corner == 0, u, np.where(corner == 1, v, w))
+        b = np.where(corner == 0, v, np.where(corner == 1, w, u))
+        column = self._axis_a.cell(primitive, a, self._any_warp)
+        row = self._axis_b.cell(primitive, b, self._any_warp)
+        slot = self._base[primitive] + column * self._stride[primitive] + row
+        return 2 * slot + front
+
+    def sample(self, slots: np.ndarray, xi: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Uniform points on the surfaces of ``slots`` (n,), ``m`` each, from ``xi`` (m, n, 2) in [0, 1).
+
+        Returns primitive int32, u, v float32 (Embree barycentrics), each (m, n).
+        """
+        slot = slots >> 1
+        primitive = np.empty(xi.shape[:2], np.int32)
+        a, b = np.empty(xi.shape[:2], np.float32), np.empty(xi.shape[:2], np.float32)
+        grouped = slot < self._group_count
+        columns = np.flatnonzero(grouped)
+        if columns.size:
+            primitive[:, columns], a[:, columns], b[:, columns] = self._sample_group(slot[columns], xi[:, columns])
+        columns = np.flatnonzero(~grouped)
+        if columns.size:
+            primitive[:, columns], a[:, columns], b[:, columns] = self._sample_cell(slot[columns], xi[:, columns])
+        corner = self._corner[primitive]
+        rest = 1 - a - b
+        u = np.where(corner == 0, a, np.where(corner == 1, rest, b))
+        v = np.where(corner == 0, b, np.where(corner == 1, a, rest))
+        return primitive, u, v
+
+    def _sample_group(self, group, xi):
+        first, last = self._group_starts[group], self._group_starts[group + 1]
+        low, high = self._member_cdf[first], self._member_cdf[last]
+        target = low + xi[..., 0] * (high - low)
+        index = np.clip(np.searchsorted(self._member_cdf, target, side="right") - 1, first, last - 1)
+        # What is left of the first number within the chosen triangle is again uniform.
+        span = self._member_cdf[index + 1] - self._member_cdf[index]
+        root = np.sqrt(np.clip((target - self._member_cdf[index]) / span, 0.0, 1.0 - 1e-7))
+        return self._members[index], 1.0 - root, root * xi[..., 1]
+
+    def _sample_cell(self, slot, xi):
+        triangle = self._own_triangles[np.searchsorted(self._own_starts, slot, side="right") - 1]
+        column, row = np.divmod(slot - self._base[triangle], self._stride[triangle])
+        a0, a1 = self._axis_a.edges(triangle, column)
+        b0, b1 = self._axis_b.edges(triangle, row)
+        width, height = np.maximum(a1 - a0, 1e-9), np.maximum(b1 - b0, 1e-9)
+        x, y = clipped_square(width, height, np.maximum(1.0 - a0 - b0, 1e-9), xi)
+        return triangle, a0 + width * x, b0 + height * y
+
+
+class _Axis:
+    """Cells along one edge of every triangle: uniform in asinh(x/w), x the distance along the edge from the focus' foot."""
+
+    def __init__(self, edge, origin, center, width, size):
+        self._length = np.maximum(np.sqrt(np.einsum("ij,ij->i", edge, edge)), np.float32(1e-12))
+        foot = np.einsum("ij,ij->i", center - origin, edge) / self._length
+        self._start = (-foot / width).astype(np.float32)
+        self._scale = (self._length / width).astype(np.float32)
+        end = self._start + self._scale
+        # Where the growth is below 12 % over the whole edge, plain division serves.
+        self.warped = np.maximum(np.abs(self._start), np.abs(end)) > 0.5
+        self._low = np.where(self.warped, np.arcsinh(self._start), 0).astype(np.float32)
+        self._span = np.where(self.warped, np.arcsinh(end) - self._low, 1).astype(np.float32)
+        reach = np.where(self.warped, self._span * width, self._length)
+        self.cells = np.clip(np.ceil(reach / size - 1e-3), 1, 4096).astype(np.int32)
+
+    def cell(self, primitive, t, any_warp):
+        cells = self.cells[primitive]
+        if any_warp:
+            warped = self.warped[primitive]
+            t = np.where(warped, (np.arcsinh(self._start[primitive] + self._scale[primitive] * t) - self._low[primitive])
+                         / self._span[primitive], t)
+        return np.clip((t * cells).astype(np.int32), 0, cells - 1)
+
+    def edges(self, triangle, index):
+        cells = self.cells[triangle]
+        return self._edge(triangle, index / cells), self._edge(triangle, (index + 1) / cells)
+
+    def _edge(self, triangle, t):
+        unwarped = (np.sinh(self._low[triangle] + self._span[triangle] * t) - self._start[triangle]) / self._scale[triangle]
+        return np.clip(np.where(self.warped[triangle], unwarped, t), 0.0, 1.0)
+
+
+def clipped_square(width, height, limit, xi) -> tuple[np.ndarray, np.ndarray]:
+    """Uniform points (x, y) of the unit square under x·width + y·height ≤ limit, by inverting the marginal in x.
+
+    All arguments (n,), ``xi`` (..., n, 2) in [0, 1). The square's height at x is 1 up to x₁ and falls linearly until x₂.
+    """
+    x1 = np.clip((limit - height) / width, 0.0, 1.0)
+    x2 = np.clip(limit / width, x1, 1.0)
+    h1 = np.clip((limit - x1 * width) / height, 0.0, 1.0)
+    slope = width / height
+    run = x2 - x1
+    area = x1 + run * h1 - 0.5 * slope * run * run
+    target = xi[..., 0] * area
+    beyond = target - x1
+    # ½·slope·s² − h1·s + beyond = 0 solved for the smaller root in the form that is stable for small slopes.
+    root = np.sqrt(np.maximum(h1 * h1 - 2.0 * slope * np.maximum(beyond, 0.0), 0.0))
+    x = np.where(beyond <= 0.0, target, x1 + 2.0 * np.maximum(beyond, 0.0) / np.maximum(h1 + root, 1e-12))
+    x = np.clip(x, 0.0, x2)
+    y = xi[..., 1] * np.clip((limit - x * width) / height, 0.0, 1.0)
+    return x, y
