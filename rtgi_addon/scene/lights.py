@@ -40,7 +40,8 @@ class SpotLight:
     """A point light within a cone about ``direction_world`` (3,) unit. ``cone_angle`` is the full angle [rad]; ``blend`` 0–1
     the soft edge: intensity × smoothstep((z − cos(cone/2)) / (blend·(1 − cos(cone/2)))), z = cosine to the axis, as in Cycles.
 
-    ``world_from_local`` (3, 3) carries a scaled lamp's elliptical cone (columns: its axes; light travels along −Z).
+    ``world_from_local`` (3, 3) carries a scaled or sheared lamp's elliptical cone (columns: its axes; light travels along −Z): z is
+    then that of −normalize(world_from_local⁻¹·d). The direction d leads from the point sampled on the lamp to the receiver.
     """
 
     name: str
@@ -60,8 +61,9 @@ class AreaLight:
     """A one-sided rectangle or ellipse: centre ``position_world``; ``half_u_world``, ``half_v_world`` (3,) half axes (half the
     sides, or the radii of the ellipse); it emits ``radiance`` (3,) [W·sr⁻¹·m⁻²] to the side of ``normal_world`` (3,) unit.
 
-    ``shape`` is 'RECTANGLE' or 'ELLIPSE' (Blender's SQUARE and DISK are these with equal axes). ``spread`` [rad] is Blender's
-    beam spread, π = none.
+    ``shape`` is 'RECTANGLE' or 'ELLIPSE' (Blender's SQUARE and DISK are these with equal axes). ``spread`` s [rad] is Blender's
+    beam spread: π = none; below it radiance × max(0, tan(s/2) − tan θ)/(tan(s/2) − s/2), θ from the normal, which keeps the flux;
+    0 = a parallel beam of irradiance π·radiance. The normal is the lamp's own −Z, also where a parent shears it.
     """
 
     name: str

@@ -16,7 +16,7 @@ def extract_scene(depsgraph=None, *, context=None, volumes: list[str] | None = N
     """The scene of ``context`` (default: the current one) as plain arrays that outlive the file. Main thread only.
 
     Without a ``depsgraph`` the scene is evaluated exactly as for F12: render subdivision levels, modifiers enabled for render,
-    objects and collections visible in render. With one, that graph is read as it is: inside a RenderEngine it is the render's own;
+    objects and collections visible in render. With one, that graph is read as it is: inside a RenderEngine it is its own;
     the viewport's has the viewport's levels, modifiers and visibility, less what is hidden from render.
 
     Lengths stay in Blender units. The scene's unit scale only changes the numbers that Blender's interface shows: Cycles measures

@@ -15,7 +15,7 @@ def render_panorama(world, width: int = 1024, samples: int = 1024) -> np.ndarray
     """Radiance (width/2, width, 3) float32 of ``world`` in ``scene.World.equirect``'s layout.
 
     Each texel averages its own square of directions. Cycles stops a texel when its noise is below 1 %, and spends up to
-    ``samples`` where a sun disc's edge makes it worth while, so the sun keeps its energy. Everything made for it is removed again.
+    ``samples`` where a sun disc's edge makes it worth while, so the sun keeps its energy. Everything it makes is removed.
     """
     with tempfile.TemporaryDirectory(prefix="rtgi-world-") as folder:
         made = []
@@ -28,7 +28,8 @@ def render_panorama(world, width: int = 1024, samples: int = 1024) -> np.ndarray
             copy = world.copy()
             made.append((bpy.data.worlds, copy))
             _see_as_diffuse_ray(copy.node_tree, made)
-            copy.cycles_visibility.camera = True
+            if not copy.cycles_visibility.camera:
+                copy.cycles_visibility.camera = True
             camera = _panoramic_camera(scene)
             made.append((bpy.data.cameras, camera))
             scene.world = copy

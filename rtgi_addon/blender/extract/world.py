@@ -58,6 +58,8 @@ def _environment(node, strength, notes):
     pixels = np.empty(width * height * channels, np.float32)
     image.pixels.foreach_get(pixels)
     pixels = pixels.reshape(height, width, channels)
+    if channels == 4 and np.any(pixels[..., 3] < 1.0):  # versions differ in what transparency does here
+        return None
     rgb = pixels[..., :3] if channels >= 3 else np.repeat(pixels[..., :1], 3, axis=2)
     return World(np.maximum(np.nan_to_num(rgb * np.float32(strength), posinf=0.0), 0.0), rotation, f"image {image.name}")
 
