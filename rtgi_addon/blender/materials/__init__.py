@@ -17,8 +17,8 @@ How extraction uses it::
 
 Meshes must carry what channels name: ``Mesh.attributes`` every name in ``reader.attributes`` that the mesh has (any domain and
 type, spread to corners as RGBA: scalars grey, vectors as RGB, alpha 1; byte colours decoded to scene-linear), with
-``ACTIVE_COLOR`` standing for the colour attribute active for render. A channel that names an attribute or UV map which a mesh lacks
-reads 0 there, as in Cycles.
+``ACTIVE_COLOR`` standing for the colour attribute active for render. A channel that names an attribute or UV map which a mesh
+lacks reads 0 there, as in Cycles.
 """
 
 from .reader import ACTIVE_COLOR, BakeRequest, MaterialReader
