@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import BakeError
 from ..progress import Progress
 from ..scene import ProbeVolume, Scene
+from ..scene.checks import check_scene
 from . import dependencies
 from .extract import extract_scene
 from .extract.volumes import fit_volume
@@ -41,9 +42,7 @@ def read_scene(context, check: bool = False) -> Scene:
     scene = extract_scene(context=context)
     findings = [Finding("note", note) for note in scene.notes]
     if check:
-        from ..scene.checks import check_scene
-
-        findings = [*(Finding(found.severity, f"{found.cause}: {found.remedy}") for found in check_scene(scene)), *findings]
+        findings = [*(Finding(found.severity, str(found)) for found in check_scene(scene)), *findings]
     session.findings[context.scene.name] = findings
     return scene
 

@@ -29,6 +29,11 @@ def missing() -> tuple[Package, ...]:
     return tuple(package for package in PACKAGES if find_spec(package.module) is None)
 
 
+def missing_required() -> list[Package]:
+    """Those without which no bake can run."""
+    return [package for package in missing() if package.required]
+
+
 def remedy(packages) -> str:
     """What to do about ``packages``."""
     names = " ".join(package.module for package in packages)
@@ -37,7 +42,7 @@ def remedy(packages) -> str:
 
 def require() -> None:
     """Raise BakeError naming the required packages that are missing."""
-    needed = [package for package in missing() if package.required]
+    needed = missing_required()
     if needed:
         listed = ", ".join(f"{package.module} ({package.purpose})" for package in needed)
         raise BakeError(f"Python packages are missing: {listed}", remedy(needed))

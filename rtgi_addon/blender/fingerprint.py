@@ -15,8 +15,8 @@ from .properties import overrides, scene_settings
 _PLAIN = {"BOOLEAN", "INT", "FLOAT", "STRING", "ENUM"}
 _LIGHT_TYPES = {"MESH", "CURVE", "CURVES", "SURFACE", "FONT", "META", "LIGHT", "LIGHT_PROBE"}
 # What the interface keeps in the same structs and light does not depend on.
-_IGNORED = {"name", "session_uid", "is_evaluated", "is_runtime_data", "location", "location_absolute", "select", "show_expanded",
-            "show_options", "show_preview", "show_texture", "width", "width_hidden", "height", "dimensions", "use_custom_color"}
+_IGNORED = {"name", "session_uid", "use_nodes", "is_evaluated", "is_runtime_data", "location", "location_absolute", "select",
+            "show_expanded", "show_options", "show_preview", "show_texture", "width", "width_hidden", "height", "dimensions", "use_custom_color"}
 
 
 def fingerprint(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> str:
@@ -29,9 +29,9 @@ def fingerprint(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> str:
             continue
         digest.update(obj.name.encode())
         digest.update(np.round(np.array(instance.matrix_world, np.float64), 5).tobytes())
-        if obj.data is None or obj.data.session_uid in seen:
+        if obj.data is None or obj.data.as_pointer() in seen:
             continue
-        seen.add(obj.data.session_uid)
+        seen.add(obj.data.as_pointer())
         _add_data(digest, obj)
         for slot in obj.material_slots:
             _add_nodes(digest, slot.material, seen)
@@ -55,9 +55,9 @@ def _add_data(digest, obj) -> None:
 
 def _add_nodes(digest, owner, seen: set) -> None:
     tree = owner if isinstance(owner, bpy.types.NodeTree) else getattr(owner, "node_tree", None)
-    if tree is None or tree.session_uid in seen:
+    if tree is None or tree.as_pointer() in seen:
         return
-    seen.add(tree.session_uid)
+    seen.add(tree.as_pointer())
     for node in tree.nodes:
         digest.update(node.bl_idname.encode())
         _add_struct(digest, node)

@@ -6,7 +6,6 @@ from pathlib import Path
 import bpy
 
 from ..errors import BakeError
-from . import dependencies
 from .bake_job import fitted_volume, last_bake_of, prepare, read_scene, record
 from .session import redraw, session
 from .worker import BakeWorker, Report, duration
@@ -242,7 +241,6 @@ _CLASSES = (RTGI_OT_bake, RTGI_OT_cancel, RTGI_OT_check, RTGI_OT_fit_volume, RTG
 
 def register() -> None:
     """Register the operators."""
-    dependencies.missing.cache_clear()
     for cls in _CLASSES:
         bpy.utils.register_class(cls)
 

@@ -9,10 +9,12 @@ import typing
 from dataclasses import fields
 
 import bpy
+import numpy as np
 
 from ..techniques import Technique, registry, validate_settings
 
-# Two ways to say how long to trace. A technique whose Settings have both gets a switch between them.
+# Two ways to say how long to trace. A technique whose Settings have both gets a switch between them; it goes by the rays unless
+# they are None.
 GOALS = ("error", "rays")
 _UNITS = {"m": {"subtype": "DISTANCE"}, "rad": {"subtype": "ANGLE"}, "%": {"subtype": "PERCENTAGE"}}
 
@@ -59,12 +61,17 @@ def blender_property(technique: Technique, item):
     if kind is str:
         return bpy.props.StringProperty(default=item.default or "", **common)
     limits = {name: meta[key] for name, key in (("min", "minimum"), ("max", "maximum")) if meta.get(key) is not None}
-    default = limits.get("min", 0) if item.default is None else item.default
+    default = _middle(**limits) if item.default is None else item.default
     if kind is int:
         return bpy.props.IntProperty(default=int(default), **{name: int(limit) for name, limit in limits.items()}, **common)
     small = 0 < abs(default) < 0.1 or 0 < abs(limits.get("min", 0)) < 0.1
     return bpy.props.FloatProperty(default=default, precision=4 if small else 3, step=0.1 if small else 3, **limits, **common,
                                    **_UNITS.get(meta.get("unit"), {}))
+
+
+def _middle(min: float = 0.0, max: float = 1.0) -> float:
+    """Where a number starts that is unset by default: the geometric middle of its range, counted from 1 if that begins at 0."""
+    return float(np.sqrt((min if min > 0 else 1.0) * max))
 
 
 def settings_group(technique: Technique, overrides: bool) -> type:
@@ -94,7 +101,10 @@ def read_value(technique: Technique, group, name: str):
     kind, optional = value_type(technique, name)
     if optional and name not in GOALS and not getattr(group, f"use_{name}"):
         return None
-    return kind(getattr(group, name))
+    value = getattr(group, name)
+    if kind is float:  # Blender keeps single precision: 0.01 comes back as 0.00999999978
+        return float(np.format_float_positional(np.float32(value), unique=True))
+    return kind(value)
 
 
 def scene_settings(scene: bpy.types.Scene):
@@ -102,8 +112,8 @@ def scene_settings(scene: bpy.types.Scene):
     technique = registry()[scene.rtgi.technique]
     group = getattr(scene.rtgi, attribute(technique.name))
     values = {item.name: read_value(technique, group, item.name) for item in fields(technique.Settings)}
-    if has_goal(technique):
-        values["rays" if scene.rtgi.mode == "ERROR" else "error"] = None
+    if has_goal(technique) and scene.rtgi.mode == "ERROR":
+        values["rays"] = None
     settings = technique.Settings(**values)
     validate_settings(settings)
     return technique, settings

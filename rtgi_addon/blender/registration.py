@@ -1,24 +1,35 @@
 """What the add-on puts into Blender, in order; taken out in reverse."""
 
-from . import cli, handlers, operators, panels, properties
+from types import ModuleType
 
-_MODULES = (properties, operators, panels, handlers, cli)
+from . import dependencies, handlers, operators, panels, properties
+
+_registered: list[ModuleType] = []
+
+
+def _modules() -> list[ModuleType]:
+    """Everything, less what cannot be imported while required packages are missing: then the panels say what to install."""
+    modules = [properties, operators, panels, handlers]
+    if not dependencies.missing_required():
+        from . import cli
+
+        modules.append(cli)
+    return modules
 
 
 def register() -> None:
     """Register every module; if one fails, those before it are taken out again, so that a second attempt starts clean."""
-    done = []
+    dependencies.missing.cache_clear()
     try:
-        for module in _MODULES:
+        for module in _modules():
             module.register()
-            done.append(module)
+            _registered.append(module)
     except Exception:
-        for module in reversed(done):
-            module.unregister()
+        unregister()
         raise
 
 
 def unregister() -> None:
-    """Unregister every module."""
-    for module in reversed(_MODULES):
-        module.unregister()
+    """Unregister every module that was registered."""
+    while _registered:
+        _registered.pop().unregister()
