@@ -16,7 +16,8 @@ _PLAIN = {"BOOLEAN", "INT", "FLOAT", "STRING", "ENUM"}
 _LIGHT_TYPES = {"MESH", "CURVE", "CURVES", "SURFACE", "FONT", "META", "LIGHT", "LIGHT_PROBE"}
 # What the interface keeps in the same structs and light does not depend on.
 _IGNORED = {"name", "session_uid", "use_nodes", "is_evaluated", "is_runtime_data", "location", "location_absolute", "select",
-            "show_expanded", "show_options", "show_preview", "show_texture", "width", "width_hidden", "height", "dimensions", "use_custom_color"}
+            "show_expanded", "show_options", "show_preview", "show_texture", "width", "width_hidden", "height", "dimensions",
+            "use_custom_color"}
 
 
 def fingerprint(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> str:
