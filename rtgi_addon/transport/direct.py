@@ -20,7 +20,7 @@ def direct_irradiance(context, points, geometric, shading, numbers, depth, lamps
     """
     result = np.zeros((len(points), 3), np.float32)
     if lamps and context.lamps.count:
-        result += _lamp_irradiance(context, points, geometric, shading, numbers.draw(depth, LAMP, 3))
+        result += lamp_irradiance(context, points, geometric, shading, numbers.draw(depth, LAMP, 3))
     scattered = np.float32(1.0 / np.pi)
     for directions, radiance in sample_environment(context, points, numbers, depth,
                                                    lambda d: np.maximum(dot(shading, d), 0.0) * scattered, (geometric, shading)):
@@ -51,7 +51,8 @@ def emitter_weight(context, primitive, t, cosine, density) -> np.ndarray:
         return np.where(np.isinf(density), np.float32(1.0), density / (density + sampled))
 
 
-def _lamp_irradiance(context, points, geometric, shading, u) -> np.ndarray:
+def lamp_irradiance(context, points, geometric, shading, u) -> np.ndarray:
+    """An unbiased estimate (n, 3) [W·m⁻²] of what all lamps give ``points`` (n, 3): one lamp each, drawn by ``u`` (n, 3)."""
     lamp, chance = _choose_lamp(context.lamps, points, shading, u[:, 0])
     sample = context.lamps.sample(lamp, points, u[:, 1:])
     cosine = dot(shading, sample.direction)
