@@ -147,32 +147,30 @@ def _luminous_power(light: Light, scene_radius: float) -> float:
 
 def _sample_sun(lamps: _Lamps, points: np.ndarray, uv: np.ndarray):
     n = len(points)
-    distance = np.full(n, np.inf, np.float32)
-    wide = lamps.one_minus_cos > 0
-    if not wide.any():
-        return -_per_point(lamps.direction, n), distance, _per_point(lamps.strength, n)
-    direction, _ = _cone(-_per_point(lamps.direction, n), lamps.one_minus_cos, uv)
+    direction = _per_point(lamps.direction, n)
+    np.negative(direction, out=direction)
+    wide = np.flatnonzero(np.broadcast_to(lamps.one_minus_cos > 0, (n,)))
+    if wide.size:
+        direction[wide], _ = _cone(direction[wide], np.broadcast_to(lamps.one_minus_cos, (n,))[wide], uv[wide])
     # Uniform radiance S/(π·sin²) over a cap of solid angle 2π(1 − cos): S·2/(1 + cos) a sample, S·1 for the facing plane's mean.
     gain = np.float32(2.0) / (np.float32(2.0) - lamps.one_minus_cos)
-    return direction, distance, _per_point(lamps.strength * gain[:, None], n)
+    return direction, np.full(n, np.inf, np.float32), _per_point(lamps.strength * gain[:, None], n)
 
 
 def _sample_point(lamps: _Lamps, points: np.ndarray, uv: np.ndarray):
     towards, distance_squared = _towards(lamps, points)
     distance = np.sqrt(distance_squared)
     direction = towards / distance[:, None]
-    radius = np.broadcast_to(lamps.radius, distance.shape)
-    if not lamps.radius.any():
-        return direction, distance, lamps.strength / distance_squared[:, None]
-    soft = np.broadcast_to(lamps.soft_falloff, distance.shape)
-    strength = np.broadcast_to(lamps.strength, points.shape)
-    factor = np.empty_like(distance)
-    disk, sphere = np.flatnonzero(soft | (radius == 0)), np.flatnonzero(~soft & (radius > 0))
-    if disk.size:
-        _sample_disk(disk, radius, towards, direction, distance, factor, uv)
-    if sphere.size:
-        _sample_sphere(sphere, radius, direction, distance, factor, uv)
-    return direction, distance, strength * factor[:, None]
+    factor = 1.0 / distance_squared
+    if lamps.radius.any():
+        radius = np.broadcast_to(lamps.radius, distance.shape)
+        soft = np.broadcast_to(lamps.soft_falloff, distance.shape)
+        disk, sphere = np.flatnonzero(soft & (radius > 0)), np.flatnonzero(~soft & (radius > 0))
+        if disk.size:
+            _sample_disk(disk, radius, towards, direction, distance, factor, uv)
+        if sphere.size:
+            _sample_sphere(sphere, radius, direction, distance, factor, uv)
+    return direction, distance, lamps.strength * factor[:, None]
 
 
 def _sample_disk(rows, radius, towards, direction, distance, factor, uv):

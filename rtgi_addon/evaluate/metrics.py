@@ -1,0 +1,135 @@
+"""How far an estimate is from its reference: errors, bias, energy and leaks, with the reference's own variance taken out.
+
+Arrays are SH coefficients (n, k, 3) or irradiances (n, 3): the first axis counts probes or points, and all that follows belongs
+to one of them. Sums are in float64. ``variance`` is the squared standard error of the reference (plus the estimate's, if it is to
+be forgiven as well), of the arrays' shape. Definitions: PHYSICS §4.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..numerics.sampling import hash_u32
+
+# Resamples of the bootstrap, and their seed.
+RESAMPLES, BOOTSTRAP_SEED = 400, 7
+
+
+class Figure(NamedTuple):
+    """A measured ``value`` and its ``standard_error`` over probes or points."""
+
+    value: float
+    standard_error: float
+
+
+def relative_rmse(estimate, reference, variance=None) -> float:
+    """√(max(Σ(x − r)² − Σ variance, 0) / Σr²): infinite for a wrong answer to a black reference, 0 for a right one."""
+    squared, power = _relative_sums(estimate, reference, variance)
+    return _root_ratio(squared.sum(), power.sum())
+
+
+def relative_rmse_figure(estimate, reference, variance=None) -> Figure:
+    """``relative_rmse`` with a standard error from a bootstrap over probes."""
+    squared, power = _relative_sums(estimate, reference, variance)
+    return _bootstrap(lambda rows: _root_ratio(squared[rows].sum(), power[rows].sum()), len(squared))
+
+
+def relmse(estimate, reference, epsilon: float = 1e-2) -> float:
+    """mean((x − r)²/(r² + ε)) with ``epsilon`` relative to the mean square of the reference, so that units do not matter."""
+    x, r = _pair(estimate, reference)
+    floor = epsilon * float(np.mean(r * r))
+    if floor == 0.0:
+        return 0.0 if not np.any(x) else np.inf
+    return float(np.mean((x - r) ** 2 / (r * r + floor)))
+
+
+def signed_bias(estimate, reference) -> Figure:
+    """Σ(x − r)/Σr, of the l = 0 coefficients alone where the arrays are SH (n, k, 3), with its standard error over probes.
+
+    The standard error is that of a ratio of sums (linearised); it shrinks with the number of probes if their errors do not share
+    a cause.
+    """
+    x, r = (_per_probe(values) for values in _pair(estimate, reference))
+    total = r.sum()
+    if total == 0.0:
+        return Figure(0.0 if not np.any(x) else np.inf, np.nan)
+    value = float((x - r).sum() / total)
+    n = len(r)
+    residual = (x - r) - value * r
+    error = np.sqrt(n / (n - 1) * np.sum(residual**2)) / abs(total) if n > 1 else np.nan
+    return Figure(value, float(error))
+
+
+def energy_ratio(estimate, reference) -> Figure:
+    """Σx/Σr: 1 where no energy is lost or made."""
+    bias = signed_bias(estimate, reference)
+    return Figure(1.0 + bias.value, bias.standard_error)
+
+
+def leak_ratio(estimate, dark, lit) -> float:
+    """Mean of ``estimate`` over the probes ``dark`` (n,) bool, which get no light, relative to that over the probes ``lit``."""
+    values = _per_probe(np.asarray(estimate, np.float64))
+    bright = float(values[lit].mean())
+    leaked = float(np.abs(values[dark]).mean())
+    if bright == 0.0:
+        return 0.0 if leaked == 0.0 else np.inf
+    return leaked / bright
+
+
+def error_per_probe(estimate, reference, variance=None) -> np.ndarray:
+    """RMS error (n,) of each probe over its coefficients and channels, in their unit, less the reference's own variance."""
+    squared, _ = _relative_sums(estimate, reference, variance)
+    return np.sqrt(np.maximum(squared, 0.0) / max(1, np.asarray(estimate)[0].size))
+
+
+def z_scores(estimate, reference, variance) -> np.ndarray:
+    """(x − r)/√variance, of the arrays' shape: standard normal where the two agree; without variance 0 or infinite."""
+    x, r = _pair(estimate, reference)
+    difference, deviation = x - r, np.sqrt(np.broadcast_to(np.asarray(variance, np.float64), x.shape))
+    unequal = np.where(difference == 0, 0.0, np.copysign(np.inf, difference))
+    return np.where(deviation > 0, difference / np.where(deviation > 0, deviation, 1.0), unequal)
+
+
+def temporal_flicker(frames) -> float:
+    """Mean over points of the standard deviation over time, relative to the mean: ``frames`` (t, n, …) of one quantity."""
+    values = np.asarray(frames, np.float64)
+    mean = float(values.mean())
+    return float(values.std(axis=0).mean()) / mean if mean else 0.0
+
+
+def _relative_sums(estimate, reference, variance) -> tuple[np.ndarray, np.ndarray]:
+    """Per probe: Σ(x − r)² − Σ variance, and Σr²."""
+    x, r = _pair(estimate, reference)
+    axes = tuple(range(1, x.ndim))
+    squared = np.sum((x - r) ** 2, axis=axes)
+    if variance is not None:
+        squared = squared - np.sum(np.broadcast_to(np.asarray(variance, np.float64), x.shape), axis=axes)
+    return squared, np.sum(r * r, axis=axes)
+
+
+def _pair(estimate, reference) -> tuple[np.ndarray, np.ndarray]:
+    x, r = np.asarray(estimate, np.float64), np.asarray(reference, np.float64)
+    if x.shape != r.shape:
+        raise ValueError(f"estimate {x.shape} and reference {r.shape} differ in shape")
+    return x, r
+
+
+def _per_probe(values: np.ndarray) -> np.ndarray:
+    """One signed number a probe: the sum over channels, of the constant coefficient alone where there are several."""
+    if values.ndim >= 3:
+        values = values[:, 0]
+    return values.reshape(len(values), -1).sum(axis=1)
+
+
+def _root_ratio(squared: float, power: float) -> float:
+    if power <= 0.0:
+        return 0.0 if squared <= 0.0 else np.inf
+    return float(np.sqrt(max(squared, 0.0) / power))
+
+
+def _bootstrap(statistic, n: int) -> Figure:
+    value = statistic(np.arange(n))
+    if n < 2:
+        return Figure(value, np.nan)
+    draws = [hash_u32(BOOTSTRAP_SEED, i, np.arange(n)) % np.uint32(n) for i in range(RESAMPLES)]
+    return Figure(value, float(np.std([statistic(rows) for rows in draws], ddof=1)))
