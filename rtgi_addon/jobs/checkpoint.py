@@ -73,7 +73,7 @@ class FileCheckpoint(Checkpoint):
                 return {key.removeprefix("array."): stored[key] for key in stored.files}
         except FileNotFoundError:
             return None
-        except (OSError, ValueError, zipfile.BadZipFile, zlib.error) as error:
+        except (OSError, EOFError, ValueError, zipfile.BadZipFile, zlib.error) as error:
             raise BakeError(f"the checkpoint {path} is damaged", "bake without --resume to start over") from error
 
     def remove(self) -> None:

@@ -50,7 +50,7 @@ class BakeSummary:
     def to_text(self) -> str:
         """The summary as lines for a person."""
         total = sum(self.seconds.values())
-        rate = f", {self.rays / total / 1e6:.1f} million a second" if self.rays and total > 0 else ""
+        rate = f", {self.rays / total / 1e6:.1f} million a second" if total > 0 and self.rays > 1e5 * total else ""
         stages = ", ".join(f"{name} {seconds:.2f}" for name, seconds in self.seconds.items() if seconds >= 0.005)
         return "\n".join([
             f"Baked {self.out} with {self.technique}, seed {self.seed}" + (" (resumed)" if self.resumed else ""),

@@ -6,7 +6,8 @@ from rtgi_addon.exchange.names import folder_names
 
 
 @pytest.mark.parametrize(("name", "folder"), [
-    ("Volume.001", "Volume.001"), ("a/b\\c", "a_b_c"), ("../../etc", "etc"), ("", "volume"), ("...", "volume"), ("Höhle 1", "H_hle_1"),
+    ("Volume.001", "Volume.001"), ("a/b\\c", "a_b_c"), ("../../etc", "etc"), ("", "volume"), ("...", "volume"),
+    ("Höhle 1", "H_hle_1"),
     ("日本", "volume"), ("CON", "volume_CON"), ("nul.x", "volume_nul.x"), ("x" * 200, "x" * 64), ("trailing. ", "trailing"),
 ])
 def test_a_name_becomes_a_safe_folder(name, folder):

@@ -75,8 +75,8 @@ class TinyTechnique(Technique):
                     slices[f"{z}"] = stored.get(f"{z}")
                     if slices[f"{z}"] is None:
                         time.sleep(settings.pause)
-                        rows = pool.map(lambda y, key=(base, number, z): _row((*key, y), nx, settings.order), range(ny))
-                        slices[f"{z}"] = np.stack(list(rows))
+                        keys = [(base, number, z, y) for y in range(ny)]
+                        slices[f"{z}"] = np.stack(list(pool.map(_row, keys, [nx] * ny, [settings.order] * ny)))
                     done += 1
                     if checkpoint.due:
                         checkpoint.save(volume.name, slices)
