@@ -177,8 +177,8 @@ def test_area_lamps_shine_to_one_side():
     assert irradiance(area(), (0, 0, 4.0), normal=(0, 0, -1))[0] == 0.0
 
 
-LIGHTS = (sun(), sun(0.3), point(), point(radius=0.4), point(radius=0.4, soft=False), spot(blend=0.3), spot(radius=0.2, blend=1.0),
-          area(), area((0, 0, 0.3)), area(shape="ELLIPSE"), area(spread=0.9), area((0, 0, 1), (0.5, 0, 0), (0.2, 0.5, 0)),
+LIGHTS = (sun(), sun(0.3), point(), point(radius=0.4), point(radius=0.4, soft=False), spot(blend=0.3),
+          spot(radius=0.2, blend=1.0), area(), area((0, 0, 0.3)), area(shape="ELLIPSE"), area(spread=0.9), area((0, 0, 1), (0.5, 0, 0), (0.2, 0.5, 0)),
           area(spread=0.0))
 
 
@@ -203,7 +203,8 @@ def test_importance_is_positive_wherever_light_arrives():
 def test_importance_is_the_irradiance_of_a_small_lamp():
     points, normals = np.zeros((1, 3), np.float32), UP
     for light in (sun(), point(), spot(), area((0, 0, 30.0))):
-        assert LampTable((light,)).irradiance_unshadowed(0, points, normals)[0, 0] == pytest.approx(irradiance(light)[0], rel=0.02)
+        estimate = LampTable((light,)).irradiance_unshadowed(0, points, normals)[0, 0]
+        assert estimate == pytest.approx(irradiance(light)[0], rel=0.02)
 
 
 def test_a_row_depends_on_itself_alone():
@@ -226,7 +227,8 @@ def test_a_row_depends_on_itself_alone():
 def test_table_tells_kinds_shadows_and_power():
     lights = (replace(sun(), casts_shadow=False), point(), area())
     table = LampTable(lights, scene_radius=2.0)
-    assert table.count == 3 and table.casts_shadow.tolist() == [False, True, True] and table.is_delta.tolist() == [True, True, False]
+    assert table.count == 3
+    assert table.casts_shadow.tolist() == [False, True, True] and table.is_delta.tolist() == [True, True, False]
     np.testing.assert_allclose(table.power_estimate, [3 * 4 * np.pi, 4 * np.pi, np.pi * 0.5], rtol=1e-6)
     empty = LampTable(())
     assert empty.count == 0 and empty.power_estimate.shape == (0,)
