@@ -47,7 +47,7 @@ def test_dering_never_leaves_negative_irradiance(order):
     coefficients[:, 0] = np.abs(coefficients[:, 0]) + 0.05
     clean = reconstruction.dering(coefficients)
     assert clean.dtype == np.float32 and np.array_equal(clean[:, 0], coefficients[:, 0])
-    dense = sh.irradiance(clean, sampling.fibonacci_sphere(20000))
+    dense = sh.irradiance(clean, sampling.fibonacci_sphere(8000))
     assert dense.min() >= 0
 
 

@@ -1,0 +1,101 @@
+"""``ProbeField``: irradiance anywhere from the probe lattices of one or several volumes."""
+
+import json
+from dataclasses import asdict
+from functools import cached_property
+
+import numpy as np
+
+from ...scene import ProbeVolume
+from ..base import Field, ProbeGrid
+from .lookup import GridLookup, LookupSettings
+
+_GRID_ARRAYS = ("sh", "validity", "visibility", "offset_world", "standard_error")
+
+
+class ProbeField(Field):
+    """The field of SH probes in ``probe_grids``, read as ``lookup`` says.
+
+    Of several volumes around a point the one with the smallest cells wins; over its outermost cell it is blended into the next.
+    A point outside all of them takes the nearest one's outermost probes. ``params`` are the settings it was baked with, to which
+    those of the lookup are added under "lookup".
+    """
+
+    technique = "probes"
+
+    def __init__(self, probe_grids, *, includes_direct: bool = False, params: dict | None = None, stats: dict | None = None,
+                 lookup: LookupSettings | None = None):
+        if not probe_grids:
+            raise ValueError("a probe field needs at least one grid")
+        self._grids = tuple(probe_grids)
+        self.includes_direct = includes_direct
+        self.lookup = lookup or LookupSettings()
+        self.params = {**(params or {}), "lookup": asdict(self.lookup)}
+        self.stats = dict(stats or {})
+
+    def with_lookup(self, lookup: LookupSettings) -> "ProbeField":
+        """The same probes, read another way."""
+        return type(self)(self._grids, includes_direct=self.includes_direct, params=self.params, stats=self.stats, lookup=lookup)
+
+    def grids(self) -> tuple[ProbeGrid, ...]:
+        """The grids as baked: neither deringed nor dilated."""
+        return self._grids
+
+    def irradiance(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """Irradiance (n, 3) float32 [W·m⁻²] at ``points`` (n, 3) with unit ``normals`` (n, 3), world space; never negative."""
+        points, normals = np.asarray(points), np.asarray(normals)
+        share = self._shares(points)
+        total = np.zeros((len(points), 3), np.float32)
+        for lookup, weight in zip(self._lookups, share.T, strict=True):
+            inside = np.flatnonzero(weight)
+            if len(inside):
+                total[inside] += weight[inside, None] * lookup.irradiance(points[inside], normals[inside])
+        return total
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """The grids' arrays, and the volumes as JSON text; ``from_arrays`` reads them back."""
+        arrays = {}
+        for number, grid in enumerate(self._grids):
+            volume = grid.volume
+            arrays[f"grid{number}.volume"] = np.array(json.dumps({
+                "name": volume.name, "resolution": [int(count) for count in volume.resolution], "fitted": volume.fitted,
+                "world_from_local": np.asarray(volume.world_from_local, np.float64).tolist(), "settings": volume.settings,
+            }))
+            for name in _GRID_ARRAYS:
+                arrays[f"grid{number}.{name}"] = getattr(grid, name)
+        return arrays
+
+    @classmethod
+    def from_arrays(cls, arrays: dict[str, np.ndarray], *, includes_direct: bool = False, params: dict | None = None,
+                    stats: dict | None = None, lookup: LookupSettings | None = None) -> "ProbeField":
+        """The field that gave ``arrays``. ``lookup`` None means the one in ``params``, if it is there."""
+        grids = []
+        while f"grid{len(grids)}.volume" in arrays:
+            prefix = f"grid{len(grids)}."
+            stored = json.loads(str(arrays[prefix + "volume"]))
+            volume = ProbeVolume(stored["name"], np.array(stored["world_from_local"]), tuple(stored["resolution"]),
+                                 stored["fitted"], stored["settings"])
+            grids.append(ProbeGrid(volume, *(arrays[prefix + name] for name in _GRID_ARRAYS)))
+        if lookup is None and params and "lookup" in params:
+            lookup = LookupSettings(**params["lookup"])
+        return cls(grids, includes_direct=includes_direct, params=params, stats=stats, lookup=lookup)
+
+    @cached_property
+    def _lookups(self) -> tuple[GridLookup, ...]:
+        """One per grid, finest cells first; made on the first question, since a bake that only writes its grids asks none."""
+        return tuple(sorted((GridLookup(grid, self.lookup) for grid in self._grids), key=lambda lookup: lookup.cell_volume))
+
+    def _shares(self, points: np.ndarray) -> np.ndarray:
+        """Share (n, volumes) float32 of each lookup in each point; rows sum to 1."""
+        share = np.zeros((len(points), len(self._lookups)), np.float32)
+        left = np.ones(len(points), np.float32)
+        for column, lookup in enumerate(self._lookups):
+            covered = lookup.coverage(points)
+            share[:, column] = left * covered
+            left *= 1.0 - covered
+        total = share.sum(axis=1)
+        outside = np.flatnonzero(total == 0.0)
+        if len(outside):
+            nearest = np.argmin([lookup.distance(points[outside]) for lookup in self._lookups], axis=0)
+            share[outside, nearest] = total[outside] = 1.0
+        return share / total[:, None]
