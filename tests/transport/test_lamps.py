@@ -178,8 +178,8 @@ def test_area_lamps_shine_to_one_side():
 
 
 LIGHTS = (sun(), sun(0.3), point(), point(radius=0.4), point(radius=0.4, soft=False), spot(blend=0.3),
-          spot(radius=0.2, blend=1.0), area(), area((0, 0, 0.3)), area(shape="ELLIPSE"), area(spread=0.9), area((0, 0, 1), (0.5, 0, 0), (0.2, 0.5, 0)),
-          area(spread=0.0))
+          spot(radius=0.2, blend=1.0), area(), area((0, 0, 0.3)), area(shape="ELLIPSE"), area(spread=0.9),
+          area((0, 0, 1), (0.5, 0, 0), (0.2, 0.5, 0)), area(spread=0.0))
 
 
 def receivers(n=4096):
