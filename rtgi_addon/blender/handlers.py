@@ -5,6 +5,7 @@ import time
 import bpy
 from bpy.app.handlers import persistent
 
+from . import properties
 from .fingerprint import fingerprint
 from .session import redraw, session
 
@@ -84,12 +85,14 @@ def register() -> None:
     """Hook into Blender's events."""
     for event, handler in _HANDLERS.items():
         getattr(bpy.app.handlers, event).append(handler)
+    properties.on_change.append(_compare_soon)
 
 
 def unregister() -> None:
     """Unhook, and forget what was known: the properties it is about are going away."""
     if bpy.app.timers.is_registered(_compare):
         bpy.app.timers.unregister(_compare)
+    properties.on_change.clear()
     for event, handler in _HANDLERS.items():
         handlers = getattr(bpy.app.handlers, event)
         if handler in handlers:

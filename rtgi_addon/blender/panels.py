@@ -60,8 +60,8 @@ def draw_actions(layout, context, width: int) -> None:
     button = row.row(align=True)
     button.enabled = not stopping
     button.operator("rtgi.cancel", text="", icon="CANCEL")
-    status = report.label if session.baking == context.scene.name else f"{session.baking}: {report.label}"
-    layout.label(text=status or "Starting", icon="TIME")
+    step = report.label[:1].upper() + report.label[1:] or "Starting"
+    draw_lines(layout, step if session.baking == context.scene.name else f"{session.baking}: {step}", width, "TIME")
 
 
 def draw_volumes(layout, context, width: int) -> None:
@@ -73,8 +73,7 @@ def draw_volumes(layout, context, width: int) -> None:
         layout.operator("rtgi.fit_volume", icon="ADD")
         return
     count = sum(obj.data.resolution_x * obj.data.resolution_y * obj.data.resolution_z for obj in volumes)
-    names = volumes[0].name if len(volumes) == 1 else f"{len(volumes)} volumes"
-    layout.label(text=f"{names}: {count:,} probes", icon="OUTLINER_OB_LIGHTPROBE")
+    layout.label(text=f"{count:,} probes in {len(volumes)} volume{'s' * (len(volumes) > 1)}", icon="OUTLINER_OB_LIGHTPROBE")
 
 
 def draw_setting(layout, group, technique, item, toggle: str | None = None) -> None:

@@ -6,6 +6,7 @@
 
 import types
 import typing
+from collections.abc import Callable
 from dataclasses import fields
 
 import bpy
@@ -17,6 +18,15 @@ from ..techniques import Technique, registry, validate_settings
 # they are None.
 GOALS = ("error", "rays")
 _UNITS = {"m": {"subtype": "DISTANCE"}, "rad": {"subtype": "ANGLE"}, "%": {"subtype": "PERCENTAGE"}}
+
+
+# Called without arguments whenever a setting of a scene or a volume has changed.
+on_change: list[Callable[[], None]] = []
+
+
+def _changed(_group, _context) -> None:
+    for listener in on_change:
+        listener()
 
 
 def attribute(technique_name: str) -> str:
@@ -51,7 +61,7 @@ def blender_property(technique: Technique, item):
     """The bpy property for one field of a ``Settings`` dataclass, with its label, tooltip, range, unit and default."""
     kind, _ = value_type(technique, item.name)
     meta = item.metadata
-    common = {"name": meta["label"], "description": tooltip(item)}
+    common = {"name": meta["label"], "description": tooltip(item), "update": _changed}
     if meta.get("choices"):
         items = [(str(choice), str(choice).replace("_", " ").capitalize(), common["description"]) for choice in meta["choices"]]
         default = meta["choices"][0] if item.default is None else item.default
@@ -81,10 +91,11 @@ def settings_group(technique: Technique, overrides: bool) -> type:
         label = item.metadata["label"]
         if overrides:
             annotations[f"override_{item.name}"] = bpy.props.BoolProperty(
-                name=f"Override {label}", description=f"Use another value of {label} for this volume than the scene's")
+                name=f"Override {label}", update=_changed,
+                description=f"Use another value of {label} for this volume than the scene's")
         if value_type(technique, item.name)[1] and item.name not in GOALS:
             annotations[f"use_{item.name}"] = bpy.props.BoolProperty(
-                name=f"Use {label}", description=tooltip(item), default=item.default is not None)
+                name=f"Use {label}", description=tooltip(item), default=item.default is not None, update=_changed)
         annotations[item.name] = blender_property(technique, item)
     suffix = attribute(technique.name) + ("_overrides" if overrides else "")
     return type(f"RTGI_PG_{suffix}", (bpy.types.PropertyGroup,), {"__annotations__": annotations})
@@ -148,16 +159,17 @@ class RTGI_PG_last_bake(bpy.types.PropertyGroup):
 def _scene_group(techniques: dict[str, Technique], groups: dict[str, type]) -> type:
     annotations = {
         "technique": bpy.props.EnumProperty(
-            name="Technique", description="How indirect light is computed",
+            name="Technique", description="How indirect light is computed", update=_changed,
             items=[(name, technique.label, technique.description.rstrip(".")) for name, technique in techniques.items()],
             default="probes" if "probes" in techniques else next(iter(techniques))),
         "output": bpy.props.StringProperty(
             name="Output", default="//rtgi_bake/", subtype="DIR_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
             description="Folder the bake is written to. An earlier bake in it is replaced once the new one is whole"),
         "seed": bpy.props.IntProperty(
-            name="Seed", description="Start of the random numbers. The same seed gives the same bytes", default=0, min=0),
+            name="Seed", description="Start of the random numbers. The same seed gives the same bytes", default=0, min=0,
+            update=_changed),
         "mode": bpy.props.EnumProperty(
-            name="Stop At", description="What ends the tracing of a probe", default="ERROR",
+            name="Stop At", description="What ends the tracing of a probe", default="ERROR", update=_changed,
             items=[("ERROR", "Error", "Trace each probe until its estimated error is small enough"),
                    ("RAYS", "Rays", "Trace the same number of rays for every probe")]),
         "last_bake": bpy.props.PointerProperty(type=RTGI_PG_last_bake),
