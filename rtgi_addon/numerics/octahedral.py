@@ -58,30 +58,29 @@ def texel_solid_angles(resolution: int) -> np.ndarray:
     return cells.reshape(resolution, 2, resolution, 2).sum(axis=(1, 3)).ravel()
 
 
-def bilinear(directions: np.ndarray, resolution: int) -> tuple[np.ndarray, np.ndarray]:
-    """The four texels about each of ``directions`` (n, 3): flat indices (n, 4) int64 and weights (n, 4) that sum to 1.
+def add_border(tiles: np.ndarray) -> np.ndarray:
+    """``tiles`` (…, T, T, c) with one more texel on every side, (…, T + 2, T + 2, c): where the map goes on past its edge.
 
-    Past the tile's border the map goes on at the mirrored texel, so the interpolation is continuous over the whole sphere.
+    Beyond an edge lies the texel mirrored along that edge, beyond a corner the opposite corner, so that plain bilinear
+    interpolation of the result is continuous over the whole sphere.
     """
-    position = (encode(directions) + 1.0) * (0.5 * resolution) - 0.5
-    base = np.floor(position)
-    fraction = position - base
-    low = base.astype(np.int64)
-    columns, rows = [], []
-    weights = np.empty((*position.shape[:-1], 4), position.dtype)
-    for corner in range(4):
-        i, j = corner & 1, corner >> 1
-        columns.append(low[..., 0] + i)
-        rows.append(low[..., 1] + j)
-        along_x = fraction[..., 0] if i else 1.0 - fraction[..., 0]
-        along_y = fraction[..., 1] if j else 1.0 - fraction[..., 1]
-        weights[..., corner] = along_x * along_y
-    column, row = np.stack(columns, axis=-1), np.stack(rows, axis=-1)
-    outside_x, outside_y = (column < 0) | (column >= resolution), (row < 0) | (row >= resolution)
+    resolution = tiles.shape[-2]
+    row, column = np.meshgrid(np.arange(-1, resolution + 1), np.arange(-1, resolution + 1), indexing="ij")
     last = resolution - 1
-    wrapped_row = np.where(outside_x, last - np.clip(row, 0, last), np.clip(row, 0, last))
-    wrapped_column = np.where(outside_y, last - np.clip(column, 0, last), np.clip(column, 0, last))
-    return wrapped_row * resolution + wrapped_column, weights
+    outside_row, outside_column = (row < 0) | (row > last), (column < 0) | (column > last)
+    row, column = np.clip(row, 0, last), np.clip(column, 0, last)
+    return tiles[..., np.where(outside_column, last - row, row), np.where(outside_row, last - column, column), :]
+
+
+def bilinear(directions: np.ndarray, resolution: int) -> tuple[np.ndarray, np.ndarray]:
+    """Where to read tiles of ``resolution`` T that ``add_border`` has widened: the flat index (…) int32 of the first of the four
+    texels about each of ``directions`` (…, 3), and the fractions (…, 2) of the way from it to the next column and row.
+
+    The others follow at + 1, + (T + 2) and + (T + 3).
+    """
+    position = (encode(directions) + 1.0) * (0.5 * resolution) + 0.5
+    low = np.clip(position.astype(np.int32), 0, resolution)
+    return low[..., 1] * (resolution + 2) + low[..., 0], position - low.astype(position.dtype)
 
 
 def _fold(xy: np.ndarray) -> np.ndarray:

@@ -46,15 +46,36 @@ def test_texel_order_is_row_times_resolution_plus_column():
     assert octahedral.texel_index(np.array([[0.9, -0.3, 0.4]]), 8)[0] == 3 * 8 + 6
 
 
+def _interpolated(values, directions, resolution):
+    bordered = octahedral.add_border(values.reshape(resolution, resolution, 1)).ravel()
+    index, fraction = octahedral.bilinear(directions, resolution)
+    assert index.min() >= 0 and index.max() + resolution + 3 < bordered.size
+    assert fraction.min() >= 0 and fraction.max() <= 1
+    x, y = fraction[:, 0], fraction[:, 1]
+    lower = bordered[index] * (1 - x) + bordered[index + 1] * x
+    upper = bordered[index + resolution + 2] * (1 - x) + bordered[index + resolution + 3] * x
+    return lower * (1 - y) + upper * y
+
+
 @pytest.mark.parametrize("resolution", [2, 7, 8])
 def test_bilinear_is_continuous_over_seams_and_exact_at_centres(resolution):
     values = np.random.default_rng(0).random(resolution**2)
     centres = octahedral.texel_directions(resolution).astype(np.float64)
-    indices, weights = octahedral.bilinear(centres, resolution)
-    assert np.allclose((values[indices] * weights).sum(1), values, atol=1e-5)
+    assert np.allclose(_interpolated(values, centres, resolution), values, atol=1e-5)
     angle = np.linspace(0, 2 * np.pi, 20001)
-    for path in (np.stack([np.cos(angle), np.zeros_like(angle) + 0.3, np.sin(angle)], axis=1),
-                 np.stack([np.cos(angle) * 0.4, np.sin(angle) * 0.4, -np.ones_like(angle)], axis=1)):
-        indices, weights = octahedral.bilinear(path, resolution)
-        assert indices.min() >= 0 and indices.max() < resolution**2 and np.allclose(weights.sum(1), 1)
-        assert np.abs(np.diff((values[indices] * weights).sum(1))).max() < 0.005 * resolution
+    around = np.stack([np.cos(angle), np.zeros_like(angle) + 0.3, np.sin(angle)], axis=1)
+    below = np.stack([np.cos(angle) * 0.4, np.sin(angle) * 0.4, -np.ones_like(angle)], axis=1)
+    for path in (around, below):
+        assert np.abs(np.diff(_interpolated(values, path, resolution))).max() < 0.005 * resolution
+
+
+def test_border_repeats_the_texel_across_the_seam():
+    bordered = octahedral.add_border(np.arange(16.0).reshape(4, 4, 1))[..., 0]
+    assert bordered.tolist() == [
+        [15, 3, 2, 1, 0, 12],
+        [12, 0, 1, 2, 3, 15],
+        [8, 4, 5, 6, 7, 11],
+        [4, 8, 9, 10, 11, 7],
+        [0, 12, 13, 14, 15, 3],
+        [3, 15, 14, 13, 12, 0],
+    ]

@@ -250,6 +250,13 @@ def test_arrays_round_trip():
     assert again.with_lookup(TRILINEAR).params["lookup"]["visibility"] is False
 
 
+def test_a_point_at_a_probe_is_finite_without_bias():
+    grid = _grid(_matrix(), (2, 2, 2), lambda points: np.ones(points.shape[:3]))
+    points = lattice.lattice_points(np.eye(4), (2, 2, 2)).reshape(-1, 3)
+    value = ProbeField([grid], lookup=LookupSettings(normal_bias=0.0)).irradiance(points, sampling.fibonacci_sphere(8))
+    assert np.allclose(value, np.pi, rtol=1e-5)
+
+
 def test_wrong_use_is_refused():
     with pytest.raises(ValueError, match="reconstruction"):
         LookupSettings("cubic")

@@ -63,7 +63,7 @@ class GridLookup:
         sh = dilate(grid).sh
         self._coefficients = (dering(sh) if settings.reconstruction == "deringed" else sh).reshape(-1, *sh.shape[3:])
         self._tile = grid.visibility.shape[3]
-        self._distances = np.ascontiguousarray(grid.visibility, np.float32).reshape(len(self._positions), -1, 2)
+        self._moments = octahedral.add_border(np.asarray(grid.visibility, np.float32)).reshape(-1, 2)
 
     def coverage(self, points: np.ndarray) -> np.ndarray:
         """(n,) float32: 1 inside the volume, falling to 0 over its outermost cell, 0 outside."""
@@ -116,9 +116,14 @@ class GridLookup:
     def _chebyshev(self, index: np.ndarray, offset: np.ndarray) -> np.ndarray:
         """(n, 8): how surely probe ``index`` sees the point at ``offset`` (n, 8, 3) from it (one-sided Chebyshev, cubed)."""
         distance = np.linalg.norm(offset, axis=-1)
-        at_probe = distance < 1e-6 * self._bias + np.finfo(np.float32).tiny
-        texel, share = octahedral.bilinear(np.where(at_probe[..., None], np.float32([0, 0, 1]), offset), self._tile)
-        moments = np.sum(self._distances[index[..., None], texel] * share[..., None], axis=-2)
+        at_probe = (distance <= 1e-6 * self._bias)[..., None]
+        texel, fraction = octahedral.bilinear(np.where(at_probe, np.float32([0, 0, 1]), offset), self._tile)
+        width = self._tile + 2
+        texel = texel + index * (width * width)
+        x, y = fraction[..., :1], fraction[..., 1:]
+        lower = (1.0 - x) * self._moments[texel] + x * self._moments[texel + 1]
+        upper = (1.0 - x) * self._moments[texel + width] + x * self._moments[texel + width + 1]
+        moments = lower + y * (upper - lower)
         mean = moments[..., 0]
         variance = np.abs(moments[..., 1] - mean * mean)
         behind = np.maximum(distance - mean, 0.0)
