@@ -134,8 +134,14 @@ def test_an_override_wins_over_a_volumes_own_setting(tmp_path, scene, monkeypatc
     own = replace(scene, volumes=(replace(scene.volumes[0], settings={"order": 3, "rays": 9}),))
     for overrides, expected in (({"order": 1}, {"rays": 9}), ({}, {"order": 3, "rays": 9})):
         with pytest.raises(pytest.fail.Exception):
-            bake(own, tmp_path / "out", overrides)
+            bake(own, tmp_path / "out", overrides, base={"order": 2})
         assert seen.pop() == expected
+
+
+def test_the_scenes_settings_are_the_base_of_the_overrides(tmp_path, scene):
+    bake(scene, tmp_path / "out", {"order": 3}, base={"order": 2, "direct": True})
+    settings = read_bundle(tmp_path / "out").manifest["settings"]
+    assert settings["order"] == 3 and settings["direct"]
 
 
 @pytest.mark.parametrize(("options", "error", "words"), [

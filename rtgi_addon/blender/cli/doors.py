@@ -86,11 +86,10 @@ def _run(argv: list[str], prog: str, open_scene: Callable[[Namespace], None], ch
 
     def read_scene() -> Scene:
         progress.step(0.0, "Reading the scene")
-        with streams.hush():
-            from ..extract import extract_scene
-            open_scene(arguments)
-            progress.check()
-            return extract_scene(progress=progress.span(0.0, EXTRACT_SHARE))
+        from ..extract import extract_scene
+        open_scene(arguments)
+        progress.check()
+        return extract_scene(progress=progress.span(0.0, EXTRACT_SHARE))
 
     try:
         with _interruptible(progress):
@@ -135,7 +134,8 @@ class _interruptible:
         self._before = signal.signal(signal.SIGINT, self._interrupt)
 
     def __exit__(self, *_):
-        signal.signal(signal.SIGINT, self._before)
+        # None stands for a handler of Blender's own, which Python cannot put back.
+        signal.signal(signal.SIGINT, self._before or signal.SIG_DFL)
 
     def _interrupt(self, signum, frame):
         if self._progress.cancelled:

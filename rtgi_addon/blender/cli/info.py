@@ -25,7 +25,7 @@ class BundleReport:
     def to_text(self) -> str:
         """The same as lines for a person."""
         manifest = self.bundle.manifest
-        settings = ", ".join(f"{name} {value}" for name, value in manifest["settings"].items())
+        settings = ", ".join(f"{name} {value}" for name, value in manifest["settings"].items() if value is not None)
         lines = [
             f"{self.bundle.path} is whole: {len(manifest['sha256'])} files, {manifest['schema']}",
             f"  scene      {manifest['scene']} (Blender {manifest['blender']}, rtgi {manifest['rtgi']})",

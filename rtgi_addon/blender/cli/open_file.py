@@ -1,6 +1,7 @@
 """Getting a scene into Blender: a .blend, a glTF file, or what is open already."""
 
 import re
+import sys
 from pathlib import Path
 
 import bpy
@@ -28,9 +29,12 @@ def take_open_file(imported: str | None) -> None:
     scene if there is none. Raises BakeError if there is neither."""
     if not bpy.data.filepath:
         # Blender goes on with its startup scene after a FILE that it could not read.
+        file = next((word for word in sys.argv[1:] if word.lower().endswith(".blend")), None)
+        if file is not None:
+            raise BakeError(f"Blender {bpy.app.version_string} could not read {file}, which is missing or damaged",
+                            "correct the path, or restore the file from a backup")
         if imported is None:
-            raise BakeError("no .blend is open, Blender was started without one or could not read it",
-                            "name an existing file before --command, or give --import FILE.glb")
+            raise BakeError("no .blend is open", "name one before --command, or give --import FILE.glb")
         bpy.data.batch_remove(list(bpy.data.objects))
         bpy.context.scene.world = None
     else:
