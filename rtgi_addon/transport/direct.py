@@ -8,8 +8,8 @@ from .vectors import dot, luminance
 
 # The density of a ray that was not drawn: light sampling never competes with it.
 NO_DENSITY = np.float32(np.inf)
-# Shadow rays stop short of what they aim at by this share of their length, so that an emitter does not shadow itself.
-SHORTENING = np.float32(1e-5)
+# Shadow rays stop short of what they aim at by this share of their length: a lamp may lie on a surface, an emitter always does.
+SHORTENING = np.float32(1e-4)
 
 
 def direct_irradiance(context, points, geometric, shading, numbers, depth, lamps=True) -> np.ndarray:
@@ -58,7 +58,7 @@ def lamp_irradiance(context, points, geometric, shading, u) -> np.ndarray:
     cosine = dot(shading, sample.direction)
     arriving = sample.irradiance * (np.maximum(cosine, 0.0) / np.maximum(chance, 1e-30))[:, None]
     lit = (cosine > 0) & (dot(geometric, sample.direction) > 0) & (chance > 0)
-    limits = sample.distance
+    limits = sample.distance * (1 - SHORTENING)
     shadowless = ~context.lamps.casts_shadow[lamp]
     return _unshadowed(context, points, sample.direction, limits, arriving, lit, shadowless)
 

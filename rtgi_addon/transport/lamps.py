@@ -123,7 +123,8 @@ def _point_rows(lights: list[PointLight] | list[SpotLight]) -> _Lamps:
 
 def _spot_local_from_world(light: SpotLight) -> np.ndarray:
     if light.world_from_local is not None:
-        return np.linalg.inv(np.asarray(light.world_from_local, np.float64))
+        # The pseudo-inverse: a lamp scaled to nothing along an axis is still a lamp.
+        return np.linalg.pinv(np.asarray(light.world_from_local, np.float64))
     axis = np.asarray(light.direction_world, np.float64).reshape(1, 3)
     tangent, bitangent = frame(-axis)
     return np.concatenate([tangent, bitangent, -axis])

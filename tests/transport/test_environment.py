@@ -117,6 +117,21 @@ def test_sampled_bright_part_has_the_right_integral(weighting):
         np.testing.assert_allclose(bright.irradiance_estimate, expected, rtol=5e-3)
 
 
+def test_bright_poles_and_seam_are_sampled_in_full():
+    """Texels whose footprint is cut by a pole or wraps around the seam, where they are all the light there is."""
+    pixels = np.full((8, 16, 3), 1e-3, np.float32)
+    pixels[0, 3], pixels[-1, 9], pixels[4, 0], pixels[4, -1] = 100.0, 50.0, 20.0, 10.0
+    world = World(pixels)
+    bright = Environment(world).bright
+    directions, weights = dense_directions(world, 32)
+    sampled, value = bright.sample(np.random.default_rng(7).random((1 << 18, 2)).astype(np.float32))
+    for axis in ([0, 0, 1], [0, 0, -1], [-1, 0, 0]):
+        lobe = np.float32(axis)
+        expected = (bright.radiance(directions)[:, 0] * weights) @ np.maximum(directions @ lobe, 0)
+        values = value[:, 0] * np.maximum(sampled @ lobe, 0)
+        assert values.mean() == pytest.approx(expected, abs=6 * values.std() / np.sqrt(len(values)) + 1e-3 * expected)
+
+
 def test_sampling_is_nearly_free_of_noise_for_one_sun():
     pixels = np.full((64, 128, 3), 0.2, np.float32)
     pixels[50, 20] = 5000.0

@@ -233,6 +233,23 @@ def test_radiance_along_given_rays():
     assert trace_radiance(glow, np.zeros((0, 3)), np.zeros((0, 3))).shape == (0, 3)
 
 
+def test_bright_texels_are_not_counted_again_behind_a_bounce():
+    """A white floor under a small blinding sky patch: what it reflects is ρ/π times the patch's irradiance, found once."""
+    pixels = np.zeros((32, 64, 3), np.float32)
+    pixels[28:, :] = 200.0
+    scene = replace(build.open_plane(0.8, half_size=100.0), world=World(pixels))
+    context = LightContext(scene)
+    n = 60_000
+    result = trace_radiance(context, np.tile(np.float32([0, 0, 1]), (n, 1)), down(n), bounces=1)[:, 0]
+    u = (np.arange(4000) + 0.5) / 4000
+    angle = u * np.pi / 2
+    ring = np.stack([np.cos(angle), 0 * angle, np.sin(angle)], axis=1).astype(np.float32)
+    irradiance = np.sum(context.environment.radiance(ring)[:, 0] * np.sin(angle) * np.cos(angle)) * 2 * np.pi * (np.pi / 2 / 4000)
+    mean, error = pooled(result)
+    assert context.environment.bright.count and mean == pytest.approx(0.8 / np.pi * irradiance, abs=6 * error)
+    assert error < 0.01 * mean
+
+
 def test_light_passes_through_cut_outs_and_half_through_blends():
     lamp = build.point_light((0, 0, 2.0), 1.0)
     for material, share in ((Material("cut", alpha=Channel.of(0.2), alpha_threshold=0.5), 1.0),
