@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import BakeError
 from ..progress import Progress
-from ..scene import ProbeVolume, Scene
+from ..scene import ProbeVolume
 from ..scene.checks import check_scene
 from . import dependencies
 from .extract import extract_scene
@@ -28,8 +28,9 @@ def prepare(context) -> Callable[[Progress], object]:
     technique, settings = scene_settings(scene)
     output = output_folder(scene.rtgi.output)
     seed = scene.rtgi.seed
+    session.findings.pop(scene.name, None)
     session.digests[scene.name] = fingerprint(scene, context.evaluated_depsgraph_get())
-    extracted = read_scene(context)
+    extracted = extract_scene(context=context)
 
     def bake(progress: Progress):
         return bake_scene(extracted, technique.name, out=output, seed=seed, base=asdict(settings), progress=progress)
@@ -37,14 +38,13 @@ def prepare(context) -> Callable[[Progress], object]:
     return bake
 
 
-def read_scene(context, check: bool = False) -> Scene:
-    """Extract the scene and keep what there is to say about it for the panel; with ``check``, run the pre-flight as well."""
+def check(context) -> list[Finding]:
+    """Read the scene, run the pre-flight, and keep all there is to say for the panel."""
     scene = extract_scene(context=context)
-    findings = [Finding("note", note) for note in scene.notes]
-    if check:
-        findings = [*(Finding(found.severity, str(found)) for found in check_scene(scene)), *findings]
+    findings = [Finding(found.severity, str(found)) for found in check_scene(scene)]
+    findings += [Finding("note", note) for note in scene.notes]
     session.findings[context.scene.name] = findings
-    return scene
+    return findings
 
 
 def fitted_volume(context) -> ProbeVolume:

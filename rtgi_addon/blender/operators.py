@@ -6,7 +6,7 @@ from pathlib import Path
 import bpy
 
 from ..errors import BakeError
-from .bake_job import fitted_volume, last_bake_of, prepare, read_scene, record
+from .bake_job import check, fitted_volume, last_bake_of, prepare, record
 from .session import redraw, session
 from .worker import BakeWorker, Report, duration
 
@@ -169,13 +169,13 @@ class RTGI_OT_check(bpy.types.Operator):
     def execute(self, context):
         """Fill the panel's list of findings."""
         try:
-            read_scene(context, check=True)
+            findings = check(context)
         except BakeError as error:
             session.errors[context.scene.name] = str(error)
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         session.errors.pop(context.scene.name, None)
-        count = sum(finding.severity != "note" for finding in session.findings[context.scene.name])
+        count = sum(finding.severity != "note" for finding in findings)
         self.report({"INFO"}, f"{count} thing{'s' * (count > 1)} to look at" if count else "Nothing stands in the way of a bake")
         redraw()
         return {"FINISHED"}

@@ -12,16 +12,23 @@ from .properties import GOALS, attribute, has_goal, value_type
 from .session import session
 from .worker import duration
 
+# Mean width of a letter of the interface's font [px], and how few go on a line however narrow the region is.
+_LETTER, _FEWEST_LETTERS = 6.6, 24
 _ICONS = {"error": "CANCEL", "warning": "ERROR", "note": "INFO"}
 
 
 def draw_lines(layout, text: str, width: int, icon: str = "NONE") -> None:
     """``text`` over as many labels as a region of ``width`` pixels needs; the icon stands before the first."""
-    characters = max(int((width - 60) / (7.2 * bpy.context.preferences.system.ui_scale)), 24)
+    scale = bpy.context.preferences.system.ui_scale or 1.0  # 0 without a window
+    characters = max(int((width - 60) / (_LETTER * scale)), _FEWEST_LETTERS)
     column = layout.column(align=True)
     column.scale_y = 0.8
     for number, line in enumerate(textwrap.wrap(text, characters) or [""]):
         column.label(text=line, icon=icon if number == 0 else ("NONE" if icon == "NONE" else "BLANK1"))
+
+
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:]
 
 
 def draw_missing(layout, width: int) -> bool:
@@ -34,7 +41,7 @@ def draw_missing(layout, width: int) -> bool:
         box.alert = bool(required)
         for package in shown:
             draw_lines(box, f"{package.module} is missing ({package.purpose})", width, "ERROR" if required else "INFO")
-        draw_lines(box, dependencies.remedy(shown).capitalize(), width)
+        draw_lines(box, _sentence(dependencies.remedy(shown)), width)
     return bool(required)
 
 
@@ -60,7 +67,7 @@ def draw_actions(layout, context, width: int) -> None:
     button = row.row(align=True)
     button.enabled = not stopping
     button.operator("rtgi.cancel", text="", icon="CANCEL")
-    step = report.label[:1].upper() + report.label[1:] or "Starting"
+    step = _sentence(report.label) or "Starting"
     draw_lines(layout, step if session.baking == context.scene.name else f"{session.baking}: {step}", width, "TIME")
 
 

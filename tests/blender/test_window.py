@@ -1,6 +1,7 @@
 """The panel in a real Blender with a window. RTGI_BLENDER holds the command that starts one, with a display, for example
 
-    RTGI_BLENDER='python tools/debian_tree.py run TREE --bind /tmp -- xvfb-run -a -s "-screen 0 1280x800x24" blender --gpu-backend vulkan'
+    RTGI_BLENDER='python tools/debian_tree.py run TREE --bind /tmp -- xvfb-run -a -s "-screen 0 1440x900x24" blender \
+        --gpu-backend vulkan'
 
 (tools/debian_tree.py makes the tree). Screenshots are kept in RTGI_SCREENSHOTS, if that names a folder.
 """
@@ -40,7 +41,7 @@ def blender(tmp_path_factory):
 def seen(blender, tmp_path_factory):
     """What tests/support/window_script.py saw."""
     report = tmp_path_factory.mktemp("window") / "report.json"
-    ran = blender("-p", 0, 0, 1280, 800, "--enable-event-simulate", "--python", REPOSITORY / "tests/support/window_script.py",
+    ran = blender("-p", 0, 0, 1440, 900, "--enable-event-simulate", "--python", REPOSITORY / "tests/support/window_script.py",
                   "--", REPOSITORY / "sample_blends/cornell_box.blend", report, f"{ADDON}.rtgi_addon")
     assert report.exists(), ran.stdout[-2000:] + ran.stderr[-2000:]
     keep = os.environ.get("RTGI_SCREENSHOTS")

@@ -89,6 +89,21 @@ def open_scene():
     yield 0.5
 
 
+def show_settings():
+    """Give the properties editor more room, and its search field what leaves only our panel."""
+    properties = area("PROPERTIES")
+    x, y = properties.x - 1, properties.y + properties.height // 2
+    window().event_simulate("MOUSEMOVE", "NOTHING", x=x, y=y)
+    yield 0.2
+    window().event_simulate("LEFTMOUSE", "PRESS", x=x, y=y)
+    for moved in range(0, 181, 20):
+        window().event_simulate("MOUSEMOVE", "NOTHING", x=x - moved, y=y)
+        yield 0.02
+    window().event_simulate("LEFTMOUSE", "RELEASE", x=x - 180, y=y)
+    properties.spaces.active.search_filter = "RTGI"
+    yield 0.7
+
+
 def click_bake():
     """Move down the sidebar from below its first header, clicking, until a bake starts."""
     sidebar = region("VIEW_3D", "UI")
@@ -147,13 +162,13 @@ def story():
     yield from until(ended)
     seen["cancelled by the button"] = session().worker.outcome.cancelled
 
-    settings(4 * SHORT)
+    settings(64 * SHORT)
     with in_view():
         for action in ("SELECT", "DESELECT", "SELECT"):
             bpy.ops.object.select_all(action=action)
             bpy.ops.ed.undo_push(message=action)
         bpy.ops.rtgi.bake("INVOKE_DEFAULT")
-    yield 0.3
+    yield 0.1
     with in_view():
         bpy.ops.ed.undo()
     seen["baking after undo"] = bool(session().baking)
@@ -189,10 +204,13 @@ def story():
     picture("failed")
 
     yield from open_scene()
-    settings(2048)
+    settings(SHORT)
+    window().scene.rtgi.mode = "ERROR"
+    yield from show_settings()
     with in_view():
         bpy.ops.rtgi.bake("INVOKE_DEFAULT")
     yield from until(lambda: session().worker.report.fraction > 0.3 or ended())
+    yield 0.2
     picture("baking")
     yield from until(ended)
     yield 1.5

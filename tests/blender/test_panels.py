@@ -1,0 +1,168 @@
+"""Every panel drawn in every state, on a layout that holds each call against what Blender has registered."""
+
+from types import SimpleNamespace
+
+import pytest
+
+bpy = pytest.importorskip("bpy", reason="needs Blender or its Python module")
+
+from fake_technique import FakeTechnique  # noqa: E402
+
+import rtgi_addon  # noqa: E402
+from rtgi_addon.techniques import registry  # noqa: E402
+
+ICONS = set(bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items.keys())
+
+
+class Layout:
+    """Takes what a panel draws as ``UILayout`` would: ``texts`` and ``shown`` properties and operators, over all sub-layouts."""
+
+    def __init__(self, parent=None):
+        self.texts, self.shown = (parent.texts, parent.shown) if parent else ([], [])
+
+    def _sub(self, **_):
+        return Layout(self)
+
+    row = column = split = box = _sub
+
+    def label(self, text="", icon="NONE"):
+        assert icon in ICONS
+        self.texts.append(text)
+
+    def prop(self, data, name, text=None, icon="NONE", expand=False):
+        assert name in data.bl_rna.properties and icon in ICONS
+        self.shown.append(name)
+
+    def operator(self, name, text=None, icon="NONE"):
+        module, _, function = name.partition(".")
+        assert getattr(getattr(bpy.ops, module), function).get_rna_type() and icon in ICONS
+        self.shown.append(name)
+
+    def progress(self, text="", factor=0.0, type="RING"):
+        assert 0 <= factor <= 1 and type in {"BAR", "RING"}
+        self.texts.append(text)
+
+
+@pytest.fixture
+def scene(monkeypatch, empty_blend, tmp_path):
+    """The add-on registered, with the fake technique chosen, and a scene that has one volume."""
+    monkeypatch.setitem(registry(), "fake", FakeTechnique())
+    rtgi_addon.register()
+    bpy.ops.mesh.primitive_cube_add(size=4)
+    bpy.ops.object.light_add(type="POINT")
+    bpy.ops.object.lightprobe_add(type="VOLUME")
+    scene = bpy.context.scene
+    scene.rtgi.technique, scene.rtgi.output = "fake", str(tmp_path / "bake")
+    yield scene
+    rtgi_addon.unregister()
+
+
+def draw(name, width=300):
+    """What the panel called ``name`` shows: its texts as one string, and the properties and operators in it."""
+    from rtgi_addon.blender import panels
+    layout, scene = Layout(), bpy.context.scene
+    probe = next((obj.data for obj in scene.objects if obj.type == "LIGHT_PROBE"), None)
+    context = SimpleNamespace(scene=scene, region=SimpleNamespace(width=width), lightprobe=probe)
+    getattr(panels, name).draw(SimpleNamespace(layout=layout), context)
+    return " ".join(layout.texts), layout.shown
+
+
+def test_settings_are_in_the_render_properties(scene):
+    _, shown = draw("RTGI_PT_render")
+    assert {"technique", "mode", "error", "order", "use_bounces", "bounces", "filtering"} <= set(shown)
+    assert "rays" not in shown
+    scene.rtgi.mode = "RAYS"
+    shown = draw("RTGI_PT_render")[1]
+    assert "rays" in shown and "error" not in shown
+    assert {"output", "seed", "rtgi.bake"} <= set(draw("RTGI_PT_render_output")[1])
+
+
+@pytest.mark.parametrize("technique", [*registry()])
+def test_the_settings_of_every_technique_can_be_drawn(scene, technique):
+    from dataclasses import fields
+    scene.rtgi.technique = technique
+    names = {item.name for item in fields(registry()[technique].Settings)} - {"rays"}
+    assert names <= set(draw("RTGI_PT_render")[1])
+
+
+def test_overrides_are_on_the_volume_only(scene):
+    from rtgi_addon.blender.panels import RTGI_PT_volume
+    shown = draw("RTGI_PT_volume")[1]
+    assert {"override_order", "order", "override_rays", "rays"} <= set(shown)
+    plane = bpy.data.lightprobes.new("Mirror", "PLANE")
+    assert not RTGI_PT_volume.poll(SimpleNamespace(lightprobe=plane))
+    assert not RTGI_PT_volume.poll(SimpleNamespace())
+    assert RTGI_PT_volume.poll(SimpleNamespace(lightprobe=bpy.data.lightprobes.new("Box", "VOLUME")))
+
+
+def test_the_sidebar_before_and_after_a_bake(scene):
+    assert "64 probes in 1 volume" in draw("RTGI_PT_bake")[0]
+    assert "Nothing baked yet" in draw("RTGI_PT_last_bake")[0]
+    assert draw("RTGI_PT_checks") == ("", ["rtgi.check"])
+    bpy.ops.rtgi.bake()
+    texts, shown = draw("RTGI_PT_last_bake")
+    assert "64" in texts and "100.0%" in texts and "0.5%" in texts and "rtgi.open_folder" in shown
+    assert "Nothing to report" in draw("RTGI_PT_checks")[0]
+
+
+def test_the_sidebar_while_baking(scene):
+    from rtgi_addon.blender.session import session
+    from rtgi_addon.blender.worker import BakeWorker, Report
+
+    def bake(progress):
+        while True:
+            progress.step(0.5, "tracing")
+
+    session.worker, session.baking = BakeWorker(bake), scene.name
+    session.worker.start()
+    session.worker.report = Report(0.25, "tracing probes", 75)
+    texts, shown = draw("RTGI_PT_bake")
+    assert "25%  ·  1 min 15 s left" in texts and "Tracing probes" in texts
+    assert shown == ["rtgi.cancel"]
+    session.worker.cancel()
+    assert "Cancelling…" in draw("RTGI_PT_bake")[0]
+    assert session.worker.join(10)
+
+
+def test_the_sidebar_says_why_a_bake_failed_and_what_was_found(scene):
+    from rtgi_addon.blender.session import Finding, session
+    session.errors[scene.name] = "Ceiling is too low: raise it"
+    session.findings[scene.name] = [Finding("warning", "Lamp: is black"), Finding("note", "one material baked")]
+    assert "Ceiling is too low: raise it" in draw("RTGI_PT_bake")[0]
+    texts, _ = draw("RTGI_PT_checks")
+    assert "Lamp: is black" in texts and "one material baked" in texts
+
+
+def test_a_stale_bake_is_said_to_be_one(scene):
+    from rtgi_addon.blender.session import session
+    bpy.ops.rtgi.bake()
+    assert "changed" not in draw("RTGI_PT_last_bake")[0]
+    session.stale[scene.name] = True
+    assert "changed since" in draw("RTGI_PT_last_bake")[0]
+
+
+def test_a_scene_without_a_volume_is_offered_one(scene):
+    for obj in [obj for obj in scene.objects if obj.type == "LIGHT_PROBE"]:
+        bpy.data.objects.remove(obj)
+    texts, shown = draw("RTGI_PT_bake")
+    assert "will be fitted" in texts and "rtgi.fit_volume" in shown
+
+
+@pytest.mark.parametrize("width", [40, 180, 1200])
+def test_long_lines_are_wrapped_to_the_region(scene, width):
+    from rtgi_addon.blender.panels import draw_lines
+    text = "The scene or its settings have changed since, and a long line has to go somewhere in a narrow sidebar"
+    layout = Layout()
+    draw_lines(layout, text, width, "ERROR")
+    assert " ".join(layout.texts) == text
+    assert (len(layout.texts) == 1) == (width == 1200)
+
+
+def test_missing_packages_are_named_with_what_to_do(scene, monkeypatch):
+    from rtgi_addon.blender import dependencies
+    for module, blocked in (("OpenEXR", True), ("embreex", False)):
+        package = next(package for package in dependencies.PACKAGES if package.module == module)
+        monkeypatch.setattr(dependencies, "missing", lambda package=package: (package,))
+        texts, _ = draw("RTGI_PT_bake", width=2000)
+        assert f"{module} is missing" in texts and f"pip install {module}" in texts
+        assert bool(dependencies.missing_required()) == blocked
