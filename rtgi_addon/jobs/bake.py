@@ -7,6 +7,7 @@ import numpy as np
 
 from .. import techniques
 from ..errors import BakeError, Cancelled, UsageError
+from ..evaluate.probe_picture import draw_probes
 from ..exchange.bundle import check_target, write_bundle
 from ..progress import Progress
 from ..scene import ProbeVolume, Scene
@@ -17,17 +18,21 @@ from .memory import peak_memory_bytes
 from .report import BakeSummary, summarize
 from .settings import build_settings
 
+# How far a bake that ends with a picture is when it begins to draw.
+PICTURE_FROM = 0.8
+
 
 def bake_scene(scene: Scene, technique: str = "probes", overrides: dict | None = None, out="bake", *,
                base: dict | None = None, seed: int = 0, threads: int | None = None, progress: Progress | None = None,
-               resume: bool = False, volume=None, checkpoint_seconds: float = 10.0, device: str = "cpu") -> BakeSummary:
+               resume: bool = False, volume=None, checkpoint_seconds: float = 10.0, device: str = "cpu",
+               picture=None) -> BakeSummary:
     """Bake the volumes of ``scene`` with the technique called ``technique`` into the bundle ``out``.
 
     ``overrides`` maps names of the technique's settings to values and wins over what a volume itself carries, which wins over
     ``base`` (the scene's own settings, as a panel holds them), which wins over the technique's defaults. ``volume`` is
     None (all of them), a name or several. The same scene, settings and seed give the same bytes for any ``threads``
     (None = every core), interrupted and continued with ``resume`` or not. A checkpoint is left in `OUT.partial` at most every
-    ``checkpoint_seconds`` and removed once the bundle is written.
+    ``checkpoint_seconds`` and removed once the bundle is written. ``picture`` is a PNG to draw the probes into after that.
 
     Raises BakeError for what the user can mend and Cancelled once ``progress.cancel`` was called: the bundle that was at
     ``out`` before is then as it was. Any other exception of the technique goes through unchanged, with the same promise.
@@ -38,6 +43,7 @@ def bake_scene(scene: Scene, technique: str = "probes", overrides: dict | None =
     settings = build_settings(method, {**(base or {}), **overrides})
     _require_device(method, device)
     target = check_target(out)
+    written = 1.0 if picture is None else PICTURE_FROM
 
     progress.stage("check")
     progress.step(0.0, "Checking the scene")
@@ -49,21 +55,25 @@ def bake_scene(scene: Scene, technique: str = "probes", overrides: dict | None =
     checkpoint = FileCheckpoint(target, fingerprint(scene, technique, settings, seed), resume=resume, interval=checkpoint_seconds)
     try:
         progress.stage("bake")
-        field = method.bake(scene, settings, np.random.default_rng(seed), progress.span(0.02, 0.97), threads=threads,
+        field = method.bake(scene, settings, np.random.default_rng(seed), progress.span(0.02, written - 0.02), threads=threads,
                             checkpoint=checkpoint)
         progress.stage("write")
-        progress.step(0.97, f"Writing {target.name}")
+        progress.step(written - 0.02, f"Writing {target.name}")
         write_bundle(target, field, scene, settings=asdict(settings), seed=seed, notes=[*scene.notes, *warnings],
                      stats=lambda: _stats(field, progress))
     except BaseException:
         checkpoint.remove_if_empty()
         raise
     checkpoint.remove()
+    summary = summarize(field, scene, out=target, technique=technique, settings=asdict(settings), seed=seed, warnings=warnings,
+                        resumed=checkpoint.resumed, stats=_stats(field, progress))
+    if picture is not None:
+        picture = draw_probes(scene, field, picture, threads=threads, progress=progress.span(PICTURE_FROM, 1.0))
+        summary = replace(summary, picture=picture)
     # The bundle is written: a wish to stop that comes only now is too late.
     with contextlib.suppress(Cancelled):
         progress.step(1.0, "Done")
-    return summarize(field, scene, out=target, technique=technique, settings=asdict(settings), seed=seed, warnings=warnings,
-                     resumed=checkpoint.resumed, stats=_stats(field, progress))
+    return summary
 
 
 def _require_device(method: techniques.Technique, device: str) -> None:

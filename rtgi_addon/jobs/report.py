@@ -27,7 +27,7 @@ class VolumeSummary:
 
 @dataclass(frozen=True)
 class BakeSummary:
-    """A finished bake; ``seconds`` maps each stage to its wall-clock time."""
+    """A finished bake; ``seconds`` maps each stage to its wall-clock time; ``picture`` is the PNG that was drawn, if one was."""
 
     out: Path
     technique: str
@@ -42,10 +42,11 @@ class BakeSummary:
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
     stats: dict
+    picture: Path | None = None
 
     def to_json(self) -> dict:
         """The summary as JSON-able values."""
-        return plain({**asdict(self), "out": str(self.out)})
+        return plain({**asdict(self), "out": str(self.out), "picture": self.picture and str(self.picture)})
 
     def to_text(self) -> str:
         """The summary as lines for a person."""
@@ -58,6 +59,7 @@ class BakeSummary:
             f"  rays     {self.rays:,}{rate}",
             f"  seconds  {total:.2f} ({stages})",
             f"  memory   {self.peak_memory_bytes / 2**20:,.0f} MiB at most",
+            *([f"  picture  {self.picture}"] if self.picture else []),
             *(f"  note     {note}" for note in self.notes),
             *(f"  warning  {warning}" for warning in self.warnings),
         ])

@@ -29,6 +29,7 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--checkpoint-seconds", type=_seconds, default=10.0, metavar="T",
                         help="how often an unfinished bake is saved (default 10)")
     parser.add_argument("--device", choices=("cpu", "gpu"), default="cpu")
+    parser.add_argument("--picture", metavar="FILE.png", help="then draw the probes as spheres in the scene they light")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", dest="assignments", type=_assignment,
                         help="any other setting of the technique; may be repeated")
 
@@ -54,7 +55,7 @@ def _run(arguments: argparse.Namespace, session: Session) -> BakeSummary:
     return bake_scene(
         scene, arguments.technique, _overrides(arguments), arguments.out, seed=arguments.seed, threads=arguments.threads,
         progress=session.progress.span(EXTRACT_SHARE, 1.0), resume=arguments.resume, volume=arguments.volume,
-        checkpoint_seconds=arguments.checkpoint_seconds, device=arguments.device)
+        checkpoint_seconds=arguments.checkpoint_seconds, device=arguments.device, picture=arguments.picture)
 
 
 def _at_least(low: int):
