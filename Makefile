@@ -13,6 +13,7 @@ setup:               ## make the virtual environment with Blender's module and e
 	@sh tools/setup.sh
 
 demo: setup          ## bake sample_blends/cornell_box.blend into demo/ and draw its probes
+	@mkdir -p demo
 	$(PYTHON) -m rtgi_addon sample_blends/cornell_box.blend bake --out demo/cornell_box --picture demo/cornell_box.png
 	@echo "The bundle is in demo/cornell_box, the picture is demo/cornell_box.png"
 
