@@ -1,0 +1,95 @@
+"""The command line with the real technique: from a .blend to a bundle, the same bytes whatever happens on the way."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rtgi_addon.exchange.bundle import read_bundle
+
+ROOT = Path(__file__).resolve().parents[2]
+CORNELL = ROOT / "sample_blends/cornell_box.blend"
+
+pytest.importorskip("bpy", reason="needs Blender's Python module")
+
+
+def start(*words):
+    return subprocess.Popen([sys.executable, "-m", "rtgi_addon", *map(str, words)], cwd=ROOT, text=True, encoding="utf-8",
+                            stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+
+
+def bake(out, *words):
+    """Bake cornell_box to ``out``; the summary."""
+    process = start(CORNELL, "bake", "--out", out, "--json", *words)
+    text, err = process.communicate(timeout=300)
+    assert process.returncode == 0, err
+    return json.loads(text)
+
+
+def contents(folder):
+    files = {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    manifest = json.loads(files.pop("bake.json"))
+    manifest.pop("stats")
+    return files, manifest
+
+
+def test_a_blend_becomes_a_bundle_with_light_in_it(tmp_path):
+    summary = bake(tmp_path / "out", "--rays", "64")
+    bundle = read_bundle(tmp_path / "out")
+    (grid,) = bundle.grids
+    assert summary["technique"] == bundle.manifest["technique"] == "probes"
+    assert summary["rays"] == bundle.manifest["stats"]["rays"] >= 64 * grid.usable.sum()
+    assert grid.order == 2 and grid.usable.mean() > 0.9
+    assert (grid.sh[grid.usable][:, 0] > 0).all()
+    assert np.isfinite(grid.standard_error[grid.usable]).all()
+
+
+def test_the_seed_decides_the_bytes_and_the_threads_do_not(tmp_path):
+    for threads in (1, 2, 5):
+        bake(tmp_path / f"{threads}", "--rays", "32", "--threads", threads, "--seed", "7")
+    bake(tmp_path / "other", "--rays", "32", "--seed", "8")
+    assert contents(tmp_path / "1") == contents(tmp_path / "2") == contents(tmp_path / "5")
+    assert contents(tmp_path / "1")[0] != contents(tmp_path / "other")[0]
+
+
+LONG = ("--rays", "4096", "--checkpoint-seconds", "0")
+
+
+def begin(out, pattern):
+    """A long bake to ``out`` whose checkpoint folder holds a file called like ``pattern``."""
+    process = start(CORNELL, "bake", "--out", out, *LONG)
+    partial = out.with_name(out.name + ".partial")
+    while process.poll() is None and not list(partial.glob(pattern)):
+        time.sleep(0.005)
+    assert process.poll() is None, process.communicate()
+    return process
+
+
+@pytest.mark.slow
+def test_a_killed_bake_resumes_to_the_same_bytes(tmp_path):
+    bake(tmp_path / "whole", *LONG)
+    process = begin(tmp_path / "out", "*.npz")
+    process.kill()
+    process.communicate()
+    assert not (tmp_path / "out").exists()
+    assert bake(tmp_path / "out", "--resume", *LONG)["resumed"]
+    assert contents(tmp_path / "out") == contents(tmp_path / "whole")
+    assert not (tmp_path / "out.partial").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT to send to one process")
+def test_ctrl_c_is_130_and_leaves_the_old_bundle(tmp_path):
+    bake(tmp_path / "out", "--rays", "16")
+    before = contents(tmp_path / "out")
+    process = begin(tmp_path / "out", "checkpoint.json")
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 130 and out == "" and err.splitlines()[-1] == "rtgi: cancelled"
+    assert contents(tmp_path / "out") == before
