@@ -29,7 +29,7 @@ RADIUS_IN_CELLS = 0.13
 NEAREST_IN_RADII = 6.0
 # Places within a pixel of the four samples that smooth edges: a rotated grid.
 SUBPIXELS = ((0.375, 0.125), (0.875, 0.375), (0.625, 0.875), (0.125, 0.625))
-LAMP_SAMPLES = 8
+LAMP_SAMPLES = 4
 INVALID_COLOURS = np.array([[0.16, 0.004, 0.004], [0.05, 0.001, 0.001]], np.float32)
 BACKDROP = 0.012
 # Exposure puts this share of what is drawn below the level where highlights begin to be rolled off.

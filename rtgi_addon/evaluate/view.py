@@ -34,10 +34,12 @@ class View:
 
         With a section, rays start where they enter its box; those that pass beside it point nowhere (direction 0)."""
         width, height = self.resolution
-        ndc = np.stack([2.0 * x / width - 1.0, 1.0 - 2.0 * y / height], axis=1)
         world_from_clip = self.camera.world_from_camera @ np.linalg.inv(self.camera.clip_from_camera)
-        near, far = (_homogeneous(world_from_clip, np.concatenate([ndc, np.full((len(x), 1), depth)], axis=1))
-                     for depth in (-1.0, 1.0))
+        # A plane of constant depth is affine in the pixel for every projection a camera has: three of its points say it all.
+        frame = np.array([[a, b, depth] for depth in (-1, 1) for a, b in ((-1, 1), (1, 1), (-1, -1))])
+        corners = _homogeneous(world_from_clip, frame)
+        across, down = (x / width)[:, None], (y / height)[:, None]
+        near, far = (c[0] + across * (c[1] - c[0]) + down * (c[2] - c[0]) for c in corners.reshape(2, 3, 3))
         directions = far - near
         directions /= np.linalg.norm(directions, axis=1, keepdims=True)
         if self.section is not None:
