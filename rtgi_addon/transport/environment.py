@@ -7,12 +7,8 @@ are interpolated alike, so base + bright is the world everywhere.
 import numpy as np
 
 from ..scene import World
+from .concentration import concentration_limit
 from .vectors import dot, luminance
-
-# What rises above this many times the mean of the rest counts as concentrated.
-CONCENTRATION = 4.0
-# The split must take at least this relative variance (mean square of the bright part over the squared mean radiance).
-WORTHWHILE_VARIANCE = 0.05
 
 
 class Environment:
@@ -139,26 +135,12 @@ class _Equirect:
 
 
 def _threshold(pixels: np.ndarray) -> float:
-    """The luminance above which radiance counts as concentrated; infinite if there is too little to be worth a shadow ray.
-
-    The fixed point of T = CONCENTRATION × mean(min(L, T)): the mean of what remains, not of what is taken out.
-    """
+    """The luminance above which radiance counts as concentrated, over solid angle."""
     brightness = luminance(pixels).astype(np.float64)
     height = len(brightness)
     share = np.cos((np.arange(height) + 0.5) / height * np.pi - 0.5 * np.pi)
     share = np.repeat((share / share.sum())[:, None], brightness.shape[1], axis=1) / brightness.shape[1]
-    mean = float((brightness * share).sum())
-    if mean <= 0.0:
-        return np.inf
-    limit = np.inf
-    for _ in range(64):
-        following = CONCENTRATION * float((np.minimum(brightness, limit) * share).sum())
-        settled = following >= 0.99 * limit
-        limit = following
-        if settled:
-            break
-    excess = np.maximum(brightness - limit, 0.0)
-    return limit if float((excess**2 * share).sum()) > WORTHWHILE_VARIANCE * mean**2 else np.inf
+    return concentration_limit(brightness, share)
 
 
 def _hat(u: np.ndarray) -> np.ndarray:

@@ -10,18 +10,20 @@ _MEMORY = 4
 MAX_ITERATIONS = 2000
 
 
-def solve_radiosity(form_factors: list[np.ndarray], source: np.ndarray, albedo: np.ndarray, bounces: int | None,
-                    tolerance: float, threads: int | None, progress: Progress) -> np.ndarray:
+def solve_radiosity(form_factors: list[np.ndarray], source: np.ndarray, first_bounce: np.ndarray, albedo: np.ndarray,
+                    bounces: int | None, tolerance: float, threads: int | None, progress: Progress) -> np.ndarray:
     """Irradiance (n + 1, 3) that texels receive from one another.
 
     ``form_factors`` holds (R, nᵢ) int32 blocks of hit texels (−1: none) for consecutive texels; ``source`` (n + 1, 3) is the
-    irradiance from elsewhere, ``albedo`` (n + 1, 3); the last row of each is zero. With ``bounces`` the series is cut after
-    ``bounces`` − 1 passes; None iterates until the largest relative change falls below ``tolerance``, with Anderson's
+    irradiance from elsewhere that is reflected in here; ``first_bounce`` (n + 1, 3) is what texels receive of light that was
+    reflected once already; ``albedo`` (n + 1, 3); the last row of each is zero. The fixed point is
+    received = first_bounce + F·ρ(source + received). With ``bounces`` the series is cut after ``bounces`` − 1 passes; None iterates until the largest relative change falls below ``tolerance``, with Anderson's
     extrapolation (Walker and Ni 2011, "Anderson acceleration for fixed-point iterations"), which changes the path, not the limit.
     """
     starts = np.concatenate(([0], np.cumsum([block.shape[1] for block in form_factors], dtype=np.int64)))
     reflect = (albedo / np.float32(np.pi)).astype(np.float32)
-    received = np.zeros_like(source)
+    passes = MAX_ITERATIONS if bounces is None else max(0, bounces - 1)
+    received = first_bounce.copy() if passes else np.zeros_like(source)
     # Rows of four floats: numpy copies 16-byte rows with a single instruction.
     radiance = np.zeros((len(source), 4), np.float32)
 
@@ -29,14 +31,15 @@ def solve_radiosity(form_factors: list[np.ndarray], source: np.ndarray, albedo: 
         block = form_factors[i]
         hits = np.take(radiance, block, axis=0, mode="wrap")
         mean = hits.sum(axis=0)[:, :3] * np.float32(np.pi / block.shape[0])
-        received[starts[i]:starts[i + 1]] = mean
+        span = slice(starts[i], starts[i + 1])
+        received[span] = first_bounce[span] + mean
 
     def apply():
         parallel_for(gather, len(form_factors), threads)
         return reflect * (source + received)
 
-    passes = MAX_ITERATIONS if bounces is None else max(0, bounces - 1)
-    current = reflect * source
+    # Starting from the first bounce saves a pass where all are wanted; a counted series starts from nothing.
+    current = reflect * (source + received) if bounces is None else reflect * source
     history = _Anderson()
     for iteration in range(passes):
         radiance[:, :3] = current

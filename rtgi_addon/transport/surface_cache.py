@@ -1,7 +1,7 @@
 """A radiosity cache on the scene's surfaces: cosine rays once, any number of bounces and any lamps afterwards.
 
 Every texel that a probe's ray reaches, or that another texel sees, traces R cosine-distributed rays from points spread over its
-area; the texels these hit are kept as a sparse form-factor matrix F of equal weights 1/R. Radiosity is then B = ρ(E + F·B)
+visible part; the texels these hit are kept as a sparse form-factor matrix F of equal weights 1/R. Irradiance is then E = E₀ + F·ρE
 (Goral et al. 1984, eq. 7, with the form factors sampled as in Keller 1996), iterated without new rays. F depends on neither
 lamps nor world. What the method is not: exact in space. A texel holds the mean over its area, so irradiance from other
 surfaces is blurred to texel size; the light of lamps is therefore taken at the hit point wherever rays can be afforded.
@@ -12,256 +12,224 @@ import numpy as np
 from ..errors import BakeError
 from ..numerics.sampling import cosine_hemisphere, frame, hash_u32, sobol_owen
 from ..progress import Progress
+from .bright import TEXEL_SAMPLES, BrightSurfaces
 from .context import LightContext
-from .sources import Sources
 from .parallel import CHUNK, parallel_for
 from .rays import offset_origins
 from .solver import solve_radiosity
+from .sources import Sources
+from .texel_light import TexelLight
+from .texel_table import SurfaceHits, TexelTable
 from .texels import TexelLayout
 from .vectors import dot
 
-# Sources up to this number are all sampled at every point; beyond, each point samples this many chosen by importance.
-ALL_SOURCES = 4
-# How many choices a texel keeps for the hits that fall into it, where there are too many sources to sample all.
-CHOICES = 16
-# Share of a texel's choices made by power alone: a lamp that the texel's centre misjudges still gets its light across.
-DEFENSIVE = np.float32(0.2)
+# Rays that leave from one point of a texel; R over this many points stand for the texel's area.
+RAYS_PER_POINT = 4
 # Emitters covering more than this share of all surfaces are found by the rays themselves; sampling them adds only noise.
 WIDE_EMITTERS = 0.2
 # Emissive triangles are sampled this often from each texel.
 EMITTER_SAMPLES = 16
+# Rows that every batch of traced texels appends.
+_ROWS = ("irradiance_sky", "irradiance_emission", "irradiance_direct", "albedo", "choices", "choice_weights")
 
 
 class SurfaceCache:
-    """Irradiance per texel. ``rays`` cosine rays and ``lamp_samples`` shadow rays per source are spent on each texel.
+    """Irradiance per texel, from ``rays`` cosine rays and up to ``lamp_samples`` shadow rays per source for each.
 
-    After ``extend`` and ``solve``: ``texel(slots)`` gives rows into ``irradiance_rest`` (n + 1, 3) (everything but the sources
-    of ``Sources``: world, emission and bounces), ``irradiance_direct`` (n + 1, 3) [W·m⁻²] and ``albedo`` (n + 1, 3). The last
-    row is zero and stands for rays that left the scene.
+    After ``reach`` and ``solve`` these arrays have a row per texel, and a last row of zeros for rays that left the scene (−1):
+    ``irradiance_rest`` (everything but the light of ``sources``), ``irradiance_direct`` (n + 1, 3) [W·m⁻²], ``albedo`` (n + 1, 3).
     """
 
     def __init__(self, context: LightContext, layout: TexelLayout, seed: int, rays: int = 64, lamp_samples: int = 8,
                  max_texels: int = 1 << 20):
         self.context, self.layout, self.sources = context, layout, Sources(context)
-        self.rays, self.lamp_samples = int(rays), min(int(lamp_samples), int(rays))
-        self.ray_count = 0
+        self.rays = max(RAYS_PER_POINT * 2, int(rays) // RAYS_PER_POINT * RAYS_PER_POINT)
+        self.points = self.rays // RAYS_PER_POINT
+        self.lamp_samples = min(int(lamp_samples), self.points)
         self._seed, self._max_texels = int(seed), max_texels
-        self._points = sobol_owen(self.rays, 6, hash_u32(seed, 0x7E8E1))
-        self._texel_of_slot = np.full(layout.slot_count, -1, np.int32)
-        self._slots = np.zeros(0, np.int32)
-        self._hits: list[np.ndarray] = []
-        self._solved = 0
+        self._sobol = sobol_owen(self.rays, 6, hash_u32(seed, 0x7E8E1))
+        self.table = TexelTable(context, layout, lambda slots: self.numbers(slots, 0, 2, self.points), self.points)
+        self.form_factors: list[np.ndarray] = []
+        self._ray_density: list[np.ndarray] = []
         none = np.zeros((1, 3), np.float32)
-        self.irradiance_sky, self.irradiance_emission, self.irradiance_direct = none, none, none
-        self.irradiance_rest, self.albedo = none, none
-        self.choices = np.zeros((1, CHOICES), np.int32)
-        self.choice_weights = np.zeros((1, CHOICES), np.float32)
-        emitters = context.emitters
-        areas = context.geometry.areas
+        self.irradiance_sky = self.irradiance_emission = self.irradiance_direct = self.albedo = self.irradiance_rest = none
+        self.choices, self.choice_weights = TexelLight.no_choices()
+        self.bright: BrightSurfaces | None = None
+        self._first_bounce, self._solved = none, 0
+        emitters, areas = context.emitters, context.geometry.areas
         wide = emitters.count and areas[emitters.primitive].sum(dtype=np.float64) > WIDE_EMITTERS * areas.sum(dtype=np.float64)
-        self.emitter_samples = 0 if wide or not emitters.count else min(EMITTER_SAMPLES, self.rays)
+        self.emitter_samples = 0 if wide or not emitters.count else min(EMITTER_SAMPLES, self.points)
+        self._light = TexelLight(self)
 
     @property
     def count(self) -> int:
-        """Number of texels in use."""
-        return len(self._slots)
+        """Number of texels that have traced their rays."""
+        return len(self.albedo) - 1
 
-    def texel(self, slots: np.ndarray) -> np.ndarray:
-        """Texel (n,) int32 of each slot, −1 (the zero row) for a slot of −1."""
-        return np.where(slots < 0, np.int32(-1), self._texel_of_slot[slots])
-
-    def extend(self, wanted: np.ndarray, progress: Progress) -> None:
-        """Bring the slots marked in ``wanted`` (slot_count,) bool into use, and every slot their rays reach in turn.
+    def reach(self, parts: list[SurfaceHits], progress: Progress) -> list[np.ndarray]:
+        """The texel (n,) int32 of every hit of each part, after bringing those into use and all that their rays reach in turn.
 
         Raises BakeError when the scene needs more than ``max_texels``.
         """
-        pending = np.flatnonzero(wanted & (self._texel_of_slot < 0)).astype(np.int32)
-        while pending.size:
-            if self.count + pending.size > self._max_texels:
+        texels = self.table.resolve(parts)
+        while self.count < self.table.count:
+            if self.table.count > self._max_texels:
                 raise BakeError(f"the surface cache needs more than {self._max_texels:,} texels",
                                 "raise the texel size, or place the probe volumes closer to what they light")
-            self._texel_of_slot[pending] = np.arange(self.count, self.count + pending.size, dtype=np.int32)
-            self._slots = np.concatenate([self._slots, pending])
-            pending = self._trace_batch(pending, progress)
+            self._trace_batch(np.arange(self.count, self.table.count), progress)
+        return texels
 
-    def _trace_batch(self, slots: np.ndarray, progress: Progress) -> np.ndarray:
+    def _trace_batch(self, texels: np.ndarray, progress: Progress) -> None:
         per_chunk = max(1, CHUNK // self.rays)
-        spans = [slice(i, min(i + per_chunk, len(slots))) for i in range(0, len(slots), per_chunk)]
-        parts = parallel_for(lambda i: self._trace(slots[spans[i]]), len(spans), self.context.threads, progress,
-                             f"surface cache, {self.count:,} texels")
-        mark = np.zeros(self.layout.slot_count, bool)
-        for hit_slots, *_ in parts:
-            mark[hit_slots[hit_slots >= 0]] = True
-        self._hits += [part[0] for part in parts]
-        rows = ["irradiance_sky", "irradiance_emission", "irradiance_direct", "albedo"]
-        if self.sources.count > ALL_SOURCES:
-            rows += ["choices", "choice_weights"]
-        for column, name in enumerate(rows, start=1):
+        spans = [texels[i:i + per_chunk] for i in range(0, len(texels), per_chunk)]
+        parts = parallel_for(lambda i: self._trace(spans[i]), len(spans), self.context.threads, progress,
+                             f"surface cache, {self.table.count:,} texels")
+        resolved = self.table.resolve([part[0] for part in parts])
+        for (hits, found, density, *_), texel in zip(parts, resolved, strict=True):
+            block = np.full(density.size, -1, np.int32)
+            block[found] = texel
+            self.form_factors.append(block.reshape(density.shape))
+            self._ray_density.append(density)
+        for column, name in enumerate(_ROWS, start=3):
             old = getattr(self, name)
             setattr(self, name, np.concatenate([old[:-1], *(part[column] for part in parts), old[-1:]]))
-        return np.flatnonzero(mark & (self._texel_of_slot < 0)).astype(np.int32)
 
-    def _numbers(self, slots: np.ndarray, first: int, last: int) -> np.ndarray:
-        """(rays, n, last − first): the shared Sobol points, shifted on the torus by a hash of each texel's slot."""
+    def numbers(self, slots: np.ndarray, first: int, last: int, count: int) -> np.ndarray:
+        """(count, n, last − first): the shared Sobol points, shifted on the torus by a hash of each texel's slot."""
         shifts = np.stack([hash_u32(slots, d, self._seed) for d in range(first, last)], axis=-1)
-        shifted = self._points[:, None, first:last] + (shifts >> np.uint32(8)).astype(np.float32) * np.float32(2.0**-24)
+        shifted = self._sobol[:count, None, first:last] + (shifts >> np.uint32(8)).astype(np.float32) * np.float32(2.0**-24)
         return shifted - np.floor(shifted)
 
-    def _surface(self, slots: np.ndarray, xi: np.ndarray):
-        """Points on texels: primitive, u, v (m·n,), position, shading and face normals (m·n, 3) turned to the slot's side."""
+    def surface(self, texels: np.ndarray, count: int):
+        """``count`` points on the visible part of each texel: primitive, u, v (count·n,), position, shading normal and face normal
+        (count·n, 3) turned to the texel's side."""
+        slots = self.table.slots[texels]
+        primitive, u, v = self.layout.sample(slots, self.numbers(slots, 0, 2, count))
+        seeds = self.table.seeds.take(texels)
+        accepted = self.table.accepted[texels, :count].T
+        primitive, u, v = (np.where(accepted, part, seed).reshape(-1) for part, seed in
+                           ((primitive, seeds.primitive), (u, seeds.u), (v, seeds.v)))
+        return self.surface_at(np.tile(slots, count), primitive, u, v)
+
+    def surface_at(self, slots: np.ndarray, primitive: np.ndarray, u: np.ndarray, v: np.ndarray):
+        """As ``surface``, for given points (m,) on ``slots`` (m,)."""
         geometry, surfaces = self.context.geometry, self.context.surfaces
-        primitive, u, v = (part.reshape(-1) for part in self.layout.sample(slots, xi))
-        side = np.tile(np.where(slots & 1, np.float32(1), np.float32(-1)), len(xi))[:, None]
+        side = np.where(slots & 1, np.float32(1), np.float32(-1))[:, None]
         face = geometry.normals_world[primitive] * side
         shading = surfaces.shading_normal(primitive, u, v) * side if surfaces.has_smooth_normals else face
         return primitive, u, v, geometry.points(primitive, u, v), shading, face
 
-    def _trace(self, slots: np.ndarray):
-        """One chunk of texels: the slots their rays hit (R, n), what world and emission give them, direct light and albedo."""
-        n, rays = len(slots), self.rays
-        surface = self._surface(slots, self._numbers(slots, 0, 2))
-        _, _, _, points, shading, face = surface
+    def _trace(self, texels: np.ndarray):
+        """One chunk: what the texels' rays hit, and what world, emission and lamps give the texels."""
+        n, rays, slots = len(texels), self.rays, self.table.slots[texels]
+        surface = self.surface(texels, self.points)
+        points, shading, face = (np.tile(part, (RAYS_PER_POINT, 1)) for part in surface[3:])
         directions, cosine = self._directions(slots, shading)
         hits = self.context.tracer.intersect(offset_origins(points, face, directions), directions)
         facing = dot(face, directions) > 0
-        miss = hits.primitive < 0
-        found = np.flatnonzero(~miss & facing)
-        hit_slots = np.full(rays * n, -1, np.int32)
-        primitive, u, v = hits.primitive[found], hits.u[found], hits.v[found]
+        found = np.flatnonzero((hits.primitive >= 0) & facing)
+        primitive, u, v, t = hits.primitive[found], hits.u[found], hits.v[found], hits.t[found]
         cosine_hit = dot(self.context.geometry.normals_world[primitive], directions[found])
-        hit_slots[found] = self.layout.slots(primitive, u, v, cosine_hit < 0)
-        sky = self._sky(directions, np.flatnonzero(miss & facing), n)
+        surface_hits = SurfaceHits(primitive, u, v, self.layout.slots(primitive, u, v, cosine_hit < 0))
+        # Density of the ray per area of the surface that it met.
+        density = np.zeros(rays * n, np.float32)
+        density[found] = cosine[found] * np.float32(1 / np.pi) * np.abs(cosine_hit) / np.maximum(t * t, np.float32(1e-20))
+        sky = self._sky(directions, np.flatnonzero((hits.primitive < 0) & facing), n)
         emission = np.zeros((n, 3), np.float32)
         if self.context.surfaces.has_emission:
-            emissive = self.context.surfaces.emissive[self.context.geometry.material[primitive]]
-            rows = np.flatnonzero(emissive)
-            weight = self._weight_of_hit(hits.t[found[rows]], cosine_hit[rows], primitive[rows], cosine[found[rows]] / np.pi)
-            radiance = np.zeros((rays * n, 3), np.float32)
-            radiance[found[rows]] = self.context.surfaces.emission(primitive[rows], u[rows], v[rows]) * weight[:, None]
-            emission = radiance.reshape(rays, n, 3).sum(axis=0) * np.float32(np.pi / rays)
+            emission = self._emission_of_hits(surface_hits, found, density[found], n)
         if self.emitter_samples:
-            emission += self._sample_emitters(slots, points, shading, face)
-        direct, choices, weights = self._direct_light(slots, surface)
-        return hit_slots.reshape(rays, n), sky, emission, direct, self._mean_albedo(surface, n), choices, weights
+            emission = emission + self._sample_emitters(slots, surface)
+        direct, choices, weights = self._light.direct(texels, surface)
+        return (surface_hits, found, density.reshape(rays, n), sky, emission, direct, self._mean_albedo(surface, n), choices, weights)
 
     def _directions(self, slots, shading) -> tuple[np.ndarray, np.ndarray]:
-        local = cosine_hemisphere(self._numbers(slots, 2, 4).reshape(-1, 2))
+        local = cosine_hemisphere(self.numbers(slots, 2, 4, self.rays).reshape(-1, 2))
         tangent, bitangent = frame(shading)
         return tangent * local[:, :1] + bitangent * local[:, 1:2] + shading * local[:, 2:], local[:, 2]
 
     def _sky(self, directions, escaped, n: int) -> np.ndarray:
         if escaped.size == 0 or self.context.environment.is_black:
             return np.zeros((n, 3), np.float32)
-        radiance = np.zeros((self.rays * n, 3), np.float32)
-        radiance[escaped] = self.context.environment.base_radiance(directions[escaped])
-        return radiance.reshape(self.rays, n, 3).sum(axis=0) * np.float32(np.pi / self.rays)
+        return self._mean_over_rays(escaped, self.context.environment.base_radiance(directions[escaped]), n)
+
+    def _mean_over_rays(self, rows, radiance, n: int) -> np.ndarray:
+        """π × the mean over each texel's rays of ``radiance`` on ``rows``: an irradiance (n, 3)."""
+        full = np.zeros((self.rays * n, 3), np.float32)
+        full[rows] = radiance
+        return full.reshape(self.rays, n, 3).sum(axis=0) * np.float32(np.pi / self.rays)
 
     def _mean_albedo(self, surface, n: int) -> np.ndarray:
-        primitive, u, v = surface[:3]
-        by_triangle = self.context.surfaces.has_uniform_albedo
-        samples = 1 if by_triangle else self.rays
-        albedo = self.context.surfaces.albedo(primitive[: samples * n], u[: samples * n], v[: samples * n])
-        return albedo.reshape(samples, n, 3).mean(axis=0)
+        count = n if self.context.surfaces.has_uniform_albedo else len(surface[0])
+        primitive, u, v = (part[:count] for part in surface[:3])
+        return self.context.surfaces.albedo(primitive, u, v).reshape(-1, n, 3).mean(axis=0)
 
-    def _weight_of_hit(self, t, cosine_hit, primitive, pdf_direction):
-        """Balance heuristic (Veach 1995) for emission found by a ray, against the same light found by sampling emitters."""
-        if not self.emitter_samples:
-            return np.ones(len(t), np.float32)
-        pdf_light = self.context.emitters.pdf_area(primitive) * t * t / np.maximum(np.abs(cosine_hit), 1e-6)
-        return (self.rays * pdf_direction / (self.rays * pdf_direction + self.emitter_samples * pdf_light)).astype(np.float32)
+    def _emission_of_hits(self, hits: SurfaceHits, found, density, n: int) -> np.ndarray:
+        rows = np.flatnonzero(self.context.surfaces.emissive[self.context.geometry.material[hits.primitive]])
+        radiance = self.context.surfaces.emission(hits.primitive[rows], hits.u[rows], hits.v[rows])
+        if self.emitter_samples:
+            # Balance heuristic (Veach 1995) against the same light found by sampling emitters.
+            by_ray = self.rays * density[rows]
+            by_light = self.emitter_samples * self.context.emitters.pdf_area(hits.primitive[rows])
+            radiance = radiance * (by_ray / np.maximum(by_ray + by_light, 1e-30))[:, None]
+        return self._mean_over_rays(found[rows], radiance, n)
 
-    def _sample_emitters(self, slots, points, shading, face) -> np.ndarray:
+    def _sample_emitters(self, slots, surface) -> np.ndarray:
         m, n = self.emitter_samples, len(slots)
         count = m * n
-        xi = np.concatenate([self._numbers(slots, 4, 6)[:m], self._numbers(slots, 3, 4)[:m]], axis=2).reshape(count, 3)
+        points, shading, face = (part[:count] for part in surface[3:])
+        xi = np.concatenate([self.numbers(slots, 4, 6, m), self.numbers(slots, 3, 4, m)], axis=2).reshape(count, 3)
         target, normal, radiance, pdf_area, _ = self.context.emitters.sample(xi)
-        points, shading, face = points[:count], shading[:count], face[:count]
         towards = target - points
-        distance = np.sqrt(np.maximum(dot(towards, towards), 1e-20))
-        direction = towards / distance[:, None]
-        cosine, cosine_light = dot(shading, direction), np.abs(dot(normal, direction))
-        rows = np.flatnonzero((cosine > 0) & (dot(face, direction) > 0) & (cosine_light > 1e-6))
+        squared = np.maximum(dot(towards, towards), np.float32(1e-20))
+        direction = towards / np.sqrt(squared)[:, None]
+        # Irradiance per radiance and area of the emitter, and the rays' density there but for π.
+        transfer = np.maximum(dot(shading, direction), 0) * np.abs(dot(normal, direction)) / squared
+        rows = np.flatnonzero((transfer > 0) & (dot(face, direction) > 0))
         origins = offset_origins(points[rows], face[rows], direction[rows])
-        rows = rows[~self.context.tracer.occluded(origins, direction[rows], distance[rows] * np.float32(1 - 1e-4))]
-        pdf_light = pdf_area[rows] * distance[rows] ** 2 / cosine_light[rows]
-        weight = 1.0 / (m * pdf_light + self.rays * cosine[rows] / np.pi)
+        rows = rows[~self.context.tracer.occluded(origins, direction[rows], np.sqrt(squared[rows]) * np.float32(1 - 1e-4))]
         result = np.zeros((count, 3), np.float32)
-        result[rows] = radiance[rows] * (cosine[rows] * weight)[:, None]
+        weight = transfer[rows] / (m * pdf_area[rows] + self.rays * transfer[rows] / np.float32(np.pi))
+        result[rows] = radiance[rows] * weight[:, None]
         return result.reshape(m, n, 3).sum(axis=0)
 
-    def _direct_light(self, slots, surface):
-        """Mean direct irradiance (n, 3) over each texel, and its choice of sources where there are too many to sample all."""
-        _, _, _, points, shading, face = surface
-        n, samples, sources = len(slots), self.lamp_samples, self.sources.count
-        result = np.zeros((n, 3), np.float32)
-        if sources == 0:
-            return result, None, None
-        choices, weights, picks = None, None, range(sources)
-        if sources > ALL_SOURCES:
-            choices, weights = self._choose(slots, points[:n], shading[:n])
-            # Every sample point takes its share of the choices, so that all of them are used.
-            picks = range(CHOICES // samples if CHOICES > samples else 1)
-        count = samples * n
-        zero = np.zeros(count, np.float32)
-        uv = self._numbers(slots, 4, 6)[:samples].reshape(count, 2)
-        for pick in picks:
-            source, weight = pick, np.float32(1)
-            if choices is not None:
-                column = (np.arange(samples) + pick * samples) % CHOICES
-                source = choices[:, column].T.reshape(-1)
-                weight = weights[:, column].T.reshape(-1, 1) / np.float32(len(picks))
-            light = self.sources.irradiance(source, points[:count], shading[:count], face[:count], zero, uv) * weight
-            result += light.reshape(samples, n, 3).mean(axis=0)
-        return result, choices, weights
-
-    def _choose(self, slots, points, normals):
-        """Pick CHOICES sources per texel in proportion to their unshadowed light at one of its points (stratified)."""
-        importance = np.stack([self.sources.importance(i, points, normals) for i in range(self.sources.count)], axis=1)
-        importance = importance.astype(np.float64)
-        total = importance.sum(axis=1, keepdims=True)
-        uniform = 1.0 / self.sources.count
-        probability = np.where(total > 0, (1 - DEFENSIVE) * importance / np.maximum(total, 1e-30) + DEFENSIVE * uniform, uniform)
-        cdf = np.cumsum(probability, axis=1)
-        cdf /= cdf[:, -1:]
-        jitter = (hash_u32(slots, 97, self._seed) >> np.uint32(8)) * 2.0**-24
-        targets = (np.arange(CHOICES) + jitter[:, None]) / CHOICES
-        # One flat search over all rows: row i's distribution is moved to [i, i + 1).
-        offset = np.arange(len(slots))[:, None]
-        flat = np.searchsorted((cdf + offset).reshape(-1), (targets + offset).reshape(-1), side="right")
-        choice = np.minimum(flat.reshape(targets.shape) - offset * self.sources.count, self.sources.count - 1)
-        # Shuffle the strata (a rotation by a hash), or each sample point would always meet the same kind of source.
-        turn = (hash_u32(slots, 98, self._seed) % np.uint32(CHOICES))[:, None]
-        order = (np.arange(CHOICES) * 7 + turn) % CHOICES
-        choice = np.take_along_axis(choice, order, axis=1)
-        weight = 1.0 / np.take_along_axis(probability, choice, axis=1)
-        return choice.astype(np.int32), weight.astype(np.float32)
+    def _sample_bright(self, texels: np.ndarray) -> np.ndarray:
+        """Irradiance (n, 3) of the bright surfaces' first reflection, balanced against the rays that hit them."""
+        m, n = min(TEXEL_SAMPLES, self.points), len(texels)
+        _, _, _, points, shading, face = self.surface(texels, m)
+        jitter = self.numbers(self.table.slots[texels], 4, 5, m)[..., 0]
+        numbers = (np.arange(m, dtype=np.float32)[:, None] + jitter) / np.float32(m)
+        direction, at_light, density, radiance = self.bright.connect(numbers.reshape(-1), points, face)
+        transfer = np.maximum(dot(shading, direction), 0) * np.maximum(at_light, 0)
+        weight = transfer / np.maximum(m * density + self.rays * transfer / np.float32(np.pi), 1e-30)
+        return (radiance * weight[:, None]).reshape(m, n, 3).sum(axis=0)
 
     def relight(self, context: LightContext, progress: Progress) -> "SurfaceCache":
         """The same texels and hits under other lamps and another world: no form-factor ray is traced again."""
         other = object.__new__(SurfaceCache)
         other.__dict__.update(self.__dict__)
-        other.context, other.sources, other._solved = context, Sources(context), 0
+        other.context, other.sources, other.bright, other._solved = context, Sources(context), None, 0
+        other._light = TexelLight(other)
         world_changed = context.environment is not self.context.environment
-        hits = np.concatenate(self._hits, axis=1) if world_changed else None
-        per_chunk = max(1, CHUNK // (self.rays if world_changed else self.lamp_samples))
-        spans = [slice(i, min(i + per_chunk, self.count)) for i in range(0, self.count, per_chunk)]
+        ends = np.cumsum([block.shape[1] for block in self.form_factors])
 
         def work(i):
-            slots = self._slots[spans[i]]
-            samples = self.rays if world_changed else self.lamp_samples
-            surface = self._surface(slots, self._numbers(slots, 0, 2)[:samples])
+            texels = np.arange(ends[i] - self.form_factors[i].shape[1], ends[i])
+            surface = self.surface(texels, self.points if world_changed else self.lamp_samples)
             sky = None
             if world_changed:
-                directions = self._directions(slots, surface[4])[0]
-                escaped = (hits[:, spans[i]].reshape(-1) < 0) & (dot(surface[5], directions) > 0)
-                sky = other._sky(directions, np.flatnonzero(escaped), len(slots))
-            return other._direct_light(slots, surface)[0], sky
+                shading, face = (np.tile(part, (RAYS_PER_POINT, 1)) for part in surface[4:])
+                directions = self._directions(self.table.slots[texels], shading)[0]
+                escaped = (self.form_factors[i].reshape(-1) < 0) & (dot(face, directions) > 0)
+                sky = other._sky(directions, np.flatnonzero(escaped), len(texels))
+            return (sky, *other._light.direct(texels, surface))
 
-        parts = parallel_for(work, len(spans), context.threads, progress, "direct light on the surface cache")
-        none = np.zeros((1, 3), np.float32)
-        other.irradiance_direct = np.concatenate([part[0] for part in parts] + [none])
-        if world_changed:
-            other.irradiance_sky = np.concatenate([part[1] for part in parts] + [none])
+        parts = parallel_for(work, len(ends), context.threads, progress, "direct light on the surface cache")
+        names = ("irradiance_sky", "irradiance_direct", "choices", "choice_weights")
+        for column, name in enumerate(names):
+            if column or world_changed:
+                rows = [part[column] for part in parts]
+                setattr(other, name, np.concatenate([*rows, np.zeros((1, rows[0].shape[1]), rows[0].dtype)]))
         return other
 
     def solve(self, bounces: int | None, tolerance: float, progress: Progress) -> None:
@@ -271,9 +239,39 @@ class SurfaceCache:
         """
         if self._solved == self.count:
             return
-        form_factors = [self.texel(hits) for hits in self._hits]
+        if self.bright is None:
+            self.bright = BrightSurfaces(self.context, self.layout, self.table.slots, self._reflected()[:-1], self._light.radiance_at,
+                                         self._seed)
+            self._first_bounce = np.zeros((1, 3), np.float32)
+        missing = self.count + 1 - len(self.bright.pdf_area)
+        if missing:
+            self.bright.pdf_area = np.concatenate([self.bright.pdf_area, np.zeros(missing, np.float32)])
+        self._first_bounce = self._gather_first_bounce(progress)
         fixed = self.irradiance_sky + self.irradiance_emission
-        source = fixed + self.irradiance_direct
-        gathered = solve_radiosity(form_factors, source, self.albedo, bounces, tolerance, self.context.threads, progress)
-        self.irradiance_rest = fixed + gathered
+        received = solve_radiosity(self.form_factors, fixed, self._first_bounce, self.albedo, bounces, tolerance,
+                                   self.context.threads, progress)
+        self.irradiance_rest = fixed + received
         self._solved = self.count
+
+    def _reflected(self) -> np.ndarray:
+        return self.albedo * self.irradiance_direct * np.float32(1 / np.pi)
+
+    def _gather_first_bounce(self, progress: Progress) -> np.ndarray:
+        """Irradiance (n + 1, 3) that texels receive from what lamps light directly; rows known from an earlier call are kept."""
+        radiance = self._reflected()
+        ends = np.cumsum([block.shape[1] for block in self.form_factors])
+        start = int(np.searchsorted(ends, len(self._first_bounce) - 1, side="right"))
+
+        def work(i):
+            block, density = self.form_factors[i], self._ray_density[i]
+            incoming = np.take(radiance, block, axis=0, mode="wrap")
+            if not self.bright.count:
+                return incoming.sum(axis=0) * np.float32(np.pi / self.rays)
+            by_light = min(TEXEL_SAMPLES, self.points) * np.take(self.bright.pdf_area, block, mode="wrap")
+            weight = np.where(by_light > 0, self.rays * density / np.maximum(self.rays * density + by_light, 1e-30), 1)
+            hit = np.einsum("rnc,rn->nc", incoming, weight) * np.float32(np.pi / self.rays)
+            return hit + self._sample_bright(np.arange(ends[i] - block.shape[1], ends[i]))
+
+        blocks = range(start, len(ends))
+        parts = parallel_for(lambda k: work(blocks[k]), len(blocks), self.context.threads, progress, "light from bright surfaces")
+        return np.concatenate([self._first_bounce[:-1], *parts, self._first_bounce[-1:]])

@@ -69,6 +69,7 @@ class TexelLayout:
         self._stride = np.where(shared, 0, self._axis_b.cells).astype(np.int32)
         self._axis_a.cells[shared] = 1
         self._axis_b.cells[shared] = 1
+        self._size = size.astype(np.float32)
         self._any_warp = bool(np.any(self._axis_a.warped & ~shared) or np.any(self._axis_b.warped & ~shared))
         self._group_count = group_count
         self._own_triangles = np.flatnonzero(~shared)
@@ -115,6 +116,38 @@ class TexelLayout:
         slot = self._base[primitive] + column * self._stride[primitive] + row
         return 2 * slot + front
 
+    def lift(self, slots: np.ndarray, primitive: np.ndarray) -> np.ndarray:
+        """Height (n,) [m] above the surface at which points of one texel are expected to see each other: little on a flat cell,
+        more over small triangles, which may bulge."""
+        return self._size[primitive] * np.where(slots >> 1 < self._group_count, np.float32(0.1), np.float32(0.02))
+
+    def areas(self, slots: np.ndarray) -> np.ndarray:
+        """Surface area (n,) float64 [m²] of each slot, as ``sample`` covers it."""
+        slot = slots >> 1
+        result = np.empty(len(slot), np.float64)
+        grouped = slot < self._group_count
+        group = slot[grouped]
+        result[grouped] = self._member_cdf[self._group_starts[group + 1]] - self._member_cdf[self._group_starts[group]]
+        triangle, a0, width, b0, height = self._cell(slot[~grouped])
+        x1, x2, h1, slope = _trapezoid(width, height, np.maximum(1.0 - a0 - b0, 1e-9))
+        clipped = x1 + (x2 - x1) * h1 - 0.5 * slope * (x2 - x1) ** 2
+        result[~grouped] = 2.0 * self._geometry.areas[triangle] * width * height * clipped
+        return result
+
+    def rim(self, slots: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Indices (m,) into ``slots`` of cells of large triangles, the triangle of each, and their corners (m, 4, 3) in world
+        space, a little inside the cell: what stands across a cell crosses its rim."""
+        rows = np.flatnonzero(slots >> 1 >= self._group_count)
+        triangle, a0, width, b0, height = self._cell(slots[rows] >> 1)
+        corners = []
+        for x, y in ((1e-3, 1e-3), (0.999, 1e-3), (0.999, 0.999), (1e-3, 0.999)):
+            a, b = a0 + width * x, b0 + height * y
+            # Corners beyond the long edge are drawn back onto it.
+            excess = np.maximum(a + b - 0.9999, 0.0) * 0.5
+            a, b = a - excess, b - excess
+            corners.append(self._origin[triangle] + a[:, None] * self._edge_a[triangle] + b[:, None] * self._edge_b[triangle])
+        return rows, triangle, np.stack(corners, axis=1).astype(np.float32)
+
     def sample(self, slots: np.ndarray, xi: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Uniform points on the surfaces of ``slots`` (n,), ``m`` each, from ``xi`` (m, n, 2) in [0, 1).
 
@@ -147,13 +180,16 @@ class TexelLayout:
         return self._members[index], 1.0 - root, root * xi[..., 1]
 
     def _sample_cell(self, slot, xi):
+        triangle, a0, width, b0, height = self._cell(slot)
+        x, y = clipped_square(width, height, np.maximum(1.0 - a0 - b0, 1e-9), xi)
+        return triangle, a0 + width * x, b0 + height * y
+
+    def _cell(self, slot):
         triangle = self._own_triangles[np.searchsorted(self._own_starts, slot, side="right") - 1]
         column, row = np.divmod(slot - self._base[triangle], self._stride[triangle])
         a0, a1 = self._axis_a.edges(triangle, column)
         b0, b1 = self._axis_b.edges(triangle, row)
-        width, height = np.maximum(a1 - a0, 1e-9), np.maximum(b1 - b0, 1e-9)
-        x, y = clipped_square(width, height, np.maximum(1.0 - a0 - b0, 1e-9), xi)
-        return triangle, a0 + width * x, b0 + height * y
+        return triangle, a0, np.maximum(a1 - a0, 1e-9), b0, np.maximum(b1 - b0, 1e-9)
 
 
 class _Axis:
@@ -194,10 +230,7 @@ def clipped_square(width, height, limit, xi) -> tuple[np.ndarray, np.ndarray]:
 
     All arguments (n,), ``xi`` (..., n, 2) in [0, 1). The square's height at x is 1 up to x₁ and falls linearly until x₂.
     """
-    x1 = np.clip((limit - height) / width, 0.0, 1.0)
-    x2 = np.clip(limit / width, x1, 1.0)
-    h1 = np.clip((limit - x1 * width) / height, 0.0, 1.0)
-    slope = width / height
+    x1, x2, h1, slope = _trapezoid(width, height, limit)
     run = x2 - x1
     area = x1 + run * h1 - 0.5 * slope * run * run
     target = xi[..., 0] * area
@@ -208,3 +241,9 @@ def clipped_square(width, height, limit, xi) -> tuple[np.ndarray, np.ndarray]:
     x = np.clip(x, 0.0, x2)
     y = xi[..., 1] * np.clip((limit - x * width) / height, 0.0, 1.0)
     return x, y
+
+
+def _trapezoid(width, height, limit):
+    x1 = np.clip((limit - height) / width, 0.0, 1.0)
+    x2 = np.clip(limit / width, x1, 1.0)
+    return x1, x2, np.clip((limit - x1 * width) / height, 0.0, 1.0), width / height

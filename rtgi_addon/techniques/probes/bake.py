@@ -140,14 +140,12 @@ class ProbeBake:
             part = progress.span(start / len(items), stop / len(items))
             traced = parallel_for(lambda i, batch=batch: self.gatherer.trace(batch[i]), len(batch), threads,
                                   part.span(0.0, 0.4), "probe rays")
-            wanted = np.zeros(self.cache.layout.slot_count, bool)
-            for one in traced:
-                wanted[one.slots[one.slots >= 0]] = True
+            texels = [None] * len(batch)
             if self.settings.bounces != 0:
-                self.cache.extend(wanted, part.span(0.4, 0.5))
-                self.cache.solve(self.settings.bounces, 0.1 * self.settings.target, part.span(0.5, 0.6))
-            gathered = parallel_for(lambda i, batch=batch, traced=traced: self.gatherer.shade(batch[i], traced[i]), len(batch),
-                                    threads, part.span(0.6, 1.0), "light at probe rays")
+                texels = self.cache.reach([one.surface for one in traced], part.span(0.4, 0.5))
+                self.cache.solve(self.settings.bounces, 0.01 * self.settings.target, part.span(0.5, 0.6))
+            gathered = parallel_for(lambda i, args=(batch, traced, texels): self.gatherer.shade(*(arg[i] for arg in args)),
+                                    len(batch), threads, part.span(0.6, 1.0), "light at probe rays")
             for index, (item, one) in enumerate(zip(batch, gathered, strict=True), start=start):
                 add(index, one)
                 self._distance[item.probes] += one.distance.transpose(1, 0, 2)

@@ -11,8 +11,9 @@ import numpy as np
 from ...numerics import octahedral, sh
 from ...numerics.sampling import hash_u32, sobol_owen, sphere_from_square
 from ...transport.context import LightContext
-from ...transport.rays import Hits
-from ...transport.surface_cache import ALL_SOURCES, CHOICES, SurfaceCache
+from ...transport.surface_cache import SurfaceCache
+from ...transport.texel_light import ALL_SOURCES, CHOICES
+from ...transport.texel_table import SurfaceHits
 from ...transport.vectors import dot
 
 # Probes that share a set of directions.
@@ -42,10 +43,12 @@ class Item:
 
 @dataclass(eq=False)
 class Traced:
-    """What an item's rays met: hits (n·m,), direction by direction, the slot of each (−1: none), and the directions (n, 3)."""
+    """What an item's rays met: ``rows`` (h,) of those (n·m, direction by direction) that hit ``surface`` (h,) at ``t`` (h,), and the
+    ``directions`` (n, 3)."""
 
-    hits: Hits
-    slots: np.ndarray
+    surface: SurfaceHits
+    rows: np.ndarray
+    t: np.ndarray
     directions: np.ndarray
 
 
@@ -79,79 +82,81 @@ class Gatherer:
         origins = np.tile(self._placement.positions[item.probes], (len(directions), 1))
         hits = self._context.tracer.intersect(origins, rays)
         rows = np.flatnonzero(hits.primitive >= 0)
-        primitive = hits.primitive[rows]
+        primitive, u, v = hits.primitive[rows], hits.u[rows], hits.v[rows]
         front = dot(self._context.geometry.normals_world[primitive], rays[rows]) < 0
-        slots = np.full(len(rays), -1, np.int32)
-        slots[rows] = self._cache.layout.slots(primitive, hits.u[rows], hits.v[rows], front)
-        return Traced(hits, slots, directions)
+        return Traced(SurfaceHits(primitive, u, v, self._cache.layout.slots(primitive, u, v, front)), rows, hits.t[rows], directions)
 
     def _numbers(self, item: Item, last: int, first: int = 0) -> np.ndarray:
         points = sobol_owen(item.last - item.first, last, hash_u32(self._seed, item.group), start=item.first)
         return points[:, first:]
 
-    def shade(self, item: Item, traced: Traced) -> Gathered:
-        """Radiance along the traced rays, projected."""
+    def shade(self, item: Item, traced: Traced, texel: np.ndarray | None) -> Gathered:
+        """Radiance along the traced rays, projected. ``texel`` (h,) is the cache's for each hit, None where nothing is reflected."""
         m, n = len(item.probes), item.last - item.first
         radiance = np.zeros((n, m, 3), np.float32)
-        flat = radiance.reshape(-1, 3)
-        rows = np.flatnonzero(traced.slots >= 0)
-        if rows.size:
-            flat[rows] = self._radiance_of_hits(item, traced, rows)
+        radiance.reshape(-1, 3)[traced.rows] = self._radiance_of_hits(item, traced, texel)
         if not self._context.environment.is_black:
             sky = self._context.environment.base_radiance(traced.directions)
-            missed = (traced.slots < 0).reshape(n, m)
-            radiance += np.where(missed[:, :, None], sky[:, None, :], 0)
+            missed = np.ones(n * m, bool)
+            missed[traced.rows] = False
+            radiance += np.where(missed.reshape(n, m, 1), sky[:, None, :], np.float32(0))
         basis = sh.evaluate(traced.directions, self._order)
-        projected = (basis.T @ radiance.reshape(n, m * 3)).reshape(-1, m, 3).transpose(1, 0, 2) * np.float32(4.0 * np.pi)
-        projected = projected + self._light_samples(item)
+        projected = _project(basis, radiance) * np.float32(4.0 * np.pi) + self._light_samples(item, texel is not None)
         return Gathered(projected, *self._visibility(item, traced))
 
-    def _radiance_of_hits(self, item: Item, traced: Traced, rows: np.ndarray) -> np.ndarray:
-        geometry, surfaces, cache = self._context.geometry, self._context.surfaces, self._cache
-        hits, m = traced.hits, len(item.probes)
-        primitive, u, v, t = hits.primitive[rows], hits.u[rows], hits.v[rows], hits.t[rows]
-        texel = cache.texel(traced.slots[rows])
-        result = np.zeros((len(rows), 3), np.float32)
-        if self._bounces != 0:
+    def _radiance_of_hits(self, item: Item, traced: Traced, texel: np.ndarray | None) -> np.ndarray:
+        geometry, surfaces, cache, hits = self._context.geometry, self._context.surfaces, self._cache, traced.surface
+        result = np.zeros((len(traced.rows), 3), np.float32)
+        if texel is not None:
             irradiance = np.take(cache.irradiance_rest, texel, axis=0, mode="wrap")
             if cache.sources.count:
-                irradiance = irradiance + self._direct(item, traced, rows, primitive, u, v, t, texel)
-            albedo = surfaces.albedo(primitive, u, v) if self._albedo is None else self._albedo[primitive]
+                irradiance += self._direct(item, traced, texel)
+            albedo = surfaces.albedo(hits.primitive, hits.u, hits.v) if self._albedo is None else self._albedo[hits.primitive]
             result = irradiance * albedo * np.float32(1.0 / np.pi)
         if surfaces.has_emission:
-            emissive = np.flatnonzero(surfaces.emissive[geometry.material[primitive]])
-            if emissive.size:
-                found = primitive[emissive]
-                emission = surfaces.emission(found, u[emissive], v[emissive])
-                if self._sample_emitters:
-                    directions = traced.directions[rows[emissive] // m]
-                    cosine = np.maximum(np.abs(dot(geometry.normals_world[found], directions)), 1e-6)
-                    pdf = self._context.emitters.pdf_area(found) * t[emissive] ** 2 / cosine
-                    emission = emission * (_UNIFORM_PDF / (_UNIFORM_PDF + pdf / RAYS_PER_LIGHT_SAMPLE))[:, None]
-                result[emissive] += emission
+            rows = np.flatnonzero(surfaces.emissive[geometry.material[hits.primitive]])
+            found = hits.take(rows)
+            emission = surfaces.emission(found.primitive, found.u, found.v)
+            if self._sample_emitters:
+                density = self._density(item, traced, rows)
+                by_light = self._context.emitters.pdf_area(found.primitive) / RAYS_PER_LIGHT_SAMPLE
+                emission = emission * (density / np.maximum(density + by_light, 1e-30))[:, None]
+            result[rows] += emission
         return result
 
-    def _direct(self, item, traced, rows, primitive, u, v, t, texel) -> np.ndarray:
-        """Irradiance (n, 3) of lamps and bright sky at hits: one shadow ray for each of a few sources, or for one chosen."""
-        geometry, surfaces, cache = self._context.geometry, self._context.surfaces, self._cache
-        m = len(item.probes)
-        step, probe = np.divmod(rows, m)
-        directions = traced.directions[step]
-        points = self._placement.positions[item.probes][probe] + directions * t[:, None]
-        side = np.where(traced.slots[rows] & 1, np.float32(1), np.float32(-1))[:, None]
-        face = geometry.normals_world[primitive] * side
-        shading = surfaces.shading_normal(primitive, u, v) * side if surfaces.has_smooth_normals else face
+    def _density(self, item: Item, traced: Traced, rows: np.ndarray) -> np.ndarray:
+        """Density (n,) [m⁻²] of probe rays on the surfaces that the given hits met."""
+        directions = traced.directions[traced.rows[rows] // len(item.probes)]
+        cosine = np.abs(dot(self._context.geometry.normals_world[traced.surface.primitive[rows]], directions))
+        return _UNIFORM_PDF * cosine / np.maximum(traced.t[rows] ** 2, np.float32(1e-20))
+
+    def _direct(self, item: Item, traced: Traced, texel: np.ndarray) -> np.ndarray:
+        """Irradiance (h, 3) of lamps and bright sky at hits: one shadow ray for each of a few sources, or for one chosen; less what
+        is sampled as a bright surface."""
+        cache, hits, rows = self._cache, traced.surface, traced.rows
+        step, probe = np.divmod(rows, len(item.probes))
+        points = self._placement.positions[item.probes][probe] + traced.directions[step] * traced.t[:, None]
+        side = np.where(hits.slots & 1, np.float32(1), np.float32(-1))[:, None]
+        face = self._context.geometry.normals_world[hits.primitive] * side
+        surfaces = self._context.surfaces
+        shading = surfaces.shading_normal(hits.primitive, hits.u, hits.v) * side if surfaces.has_smooth_normals else face
         if cache.sources.count <= ALL_SOURCES:
-            numbers = None if cache.sources.is_delta.all() else self._shifted(item, 2, 4)
+            numbers = None if cache.sources.is_delta.all() else self._shifted(item, 2, 4)[rows]
             total = np.zeros((len(rows), 3), np.float32)
             for source in range(cache.sources.count):
-                uv = np.zeros((len(rows), 2), np.float32) if cache.sources.is_delta[source] else _turn(numbers[rows], source)
-                total += cache.sources.irradiance(source, points, shading, face, t, uv)
-            return total
-        numbers = self._shifted(item, 2, 5)[rows]
-        column = np.minimum((numbers[:, 2] * CHOICES).astype(np.int64), CHOICES - 1)
-        source, weight = cache.choices[texel, column], cache.choice_weights[texel, column]
-        return cache.sources.irradiance(source, points, shading, face, t, numbers[:, :2]) * weight[:, None]
+                uv = np.zeros((len(rows), 2), np.float32) if cache.sources.is_delta[source] else _turn(numbers, source)
+                total += cache.sources.irradiance(source, points, shading, face, traced.t, uv)
+        else:
+            numbers = self._shifted(item, 2, 5)[rows]
+            column = np.minimum((numbers[:, 2] * CHOICES).astype(np.int64), CHOICES - 1)
+            source, weight = cache.choices[texel, column], cache.choice_weights[texel, column]
+            total = cache.sources.irradiance(source.astype(np.int64), points, shading, face, traced.t, numbers[:, :2]) * weight[:, None]
+        if cache.bright.count:
+            pdf = np.take(cache.bright.pdf_area, texel, mode="wrap")
+            found = np.flatnonzero(pdf)
+            density = self._density(item, traced, found)
+            total[found] *= (density / np.maximum(density + pdf[found] / RAYS_PER_LIGHT_SAMPLE, 1e-30))[:, None]
+        return total
 
     def _shifted(self, item: Item, first: int, last: int) -> np.ndarray:
         """(n·m, last − first): the sequence's further dimensions, shifted on the torus for each probe by a hash."""
@@ -159,43 +164,56 @@ class Gatherer:
         numbers = self._numbers(item, last, first)[:, None] + (shift >> np.uint32(8)).astype(np.float32) * np.float32(2.0**-24)
         return (numbers - np.floor(numbers)).reshape(-1, last - first)
 
-    def _light_samples(self, item: Item) -> np.ndarray | np.float32:
-        """Sums (m, k, 3), in the units of Gathered.sh, of emitters and bright sky seen straight from the probes."""
-        context, rays = self._context, item.last - item.first
-        n, m = rays // RAYS_PER_LIGHT_SAMPLE, len(item.probes)
+    def _light_samples(self, item: Item, reflected: bool) -> np.ndarray | np.float32:
+        """Sums (m, k, 3), in the units of Gathered.sh, of emitters, bright surfaces and bright sky sampled from the probes."""
+        context, rays, bright_surfaces = self._context, item.last - item.first, self._cache.bright
+        n, m, k = rays // RAYS_PER_LIGHT_SAMPLE, len(item.probes), sh.coefficient_count(self._order)
+        sample_bright = reflected and bright_surfaces.count > 0
         bright = context.environment.bright
-        if n == 0 or not (self._sample_emitters or bright.count):
+        if n == 0 or not (self._sample_emitters or sample_bright or bright.count):
             return np.float32(0)
-        total = np.zeros((m, sh.coefficient_count(self._order), 3), np.float32)
+        total = np.zeros((m, k, 3), np.float32)
         start = item.first // RAYS_PER_LIGHT_SAMPLE
         origins = np.tile(self._placement.positions[item.probes], (n, 1))
         if bright.count:
-            xi = sobol_owen(n, 2, hash_u32(self._seed, item.group, 3), start=start)
-            directions, weight = bright.sample(xi)
+            directions, weight = bright.sample(sobol_owen(n, 2, hash_u32(self._seed, item.group, 3), start=start))
             free = ~context.tracer.occluded(origins, np.repeat(directions, m, axis=0))
-            seen = np.where(free.reshape(n, m, 1), weight[:, None, :], 0).astype(np.float32)
-            basis = sh.evaluate(directions, self._order)
-            total += (basis.T @ seen.reshape(n, m * 3)).reshape(-1, m, 3).transpose(1, 0, 2) * np.float32(rays / n)
+            seen = np.where(free.reshape(n, m, 1), weight[:, None, :], np.float32(0))
+            total += _project(sh.evaluate(directions, self._order), seen) * np.float32(RAYS_PER_LIGHT_SAMPLE)
+        connections = []
         if self._sample_emitters:
             xi = sobol_owen(n, 3, hash_u32(self._seed, item.group, 4), start=start)
-            target, normal, emission, pdf_area, _ = context.emitters.sample(xi)
-            towards = np.repeat(target, m, axis=0) - origins
-            distance = np.sqrt(np.maximum(dot(towards, towards), 1e-20))
-            directions = towards / distance[:, None]
-            cosine = np.maximum(np.abs(dot(np.repeat(normal, m, axis=0), directions)), 1e-6)
-            pdf = np.repeat(pdf_area, m) * distance**2 / cosine
-            free = ~context.tracer.occluded(origins, directions, distance * np.float32(1 - 1e-4))
+            connections.append(self._connect_emitters(xi, origins, m))
+        if sample_bright:
+            # Each probe meets its own points of the pool, in the sequence's order.
+            shift = (hash_u32(item.probes, self._seed, 5) >> np.uint32(8)).astype(np.float32) * np.float32(2.0**-24)
+            numbers = sobol_owen(n, 1, hash_u32(self._seed, item.group, 5), start=start) + shift
+            connections.append(bright_surfaces.connect((numbers - np.floor(numbers)).reshape(-1), origins, None))
+        for directions, at_light, density, emission in connections:
             # The balance heuristic over rays and samples together, with both counted per ray.
-            weight = np.where(free, 1.0 / (_UNIFORM_PDF + pdf / RAYS_PER_LIGHT_SAMPLE), 0)
-            seen = np.repeat(emission, m, axis=0) * weight[:, None]
-            basis = sh.evaluate(directions, self._order)
-            total += np.einsum("nmk,nmc->mkc", basis.reshape(n, m, -1), seen.reshape(n, m, 3).astype(np.float32))
+            at_light = np.maximum(at_light, 0)
+            weight = at_light / np.maximum(_UNIFORM_PDF * at_light + density / RAYS_PER_LIGHT_SAMPLE, 1e-30)
+            basis = sh.evaluate(directions, self._order).reshape(n, m, k)
+            total += np.matmul(basis.transpose(1, 2, 0), (emission * weight[:, None]).reshape(n, m, 3).transpose(1, 0, 2))
         return total
+
+    def _connect_emitters(self, xi: np.ndarray, origins: np.ndarray, m: int):
+        """As BrightSurfaces.connect, for emissive triangles: n samples shared by m probes."""
+        target, normal, emission, pdf_area, _ = (np.repeat(part, m, axis=0) for part in self._context.emitters.sample(xi))
+        towards = target - origins
+        squared = np.maximum(dot(towards, towards), np.float32(1e-20))
+        distance = np.sqrt(squared)
+        directions = towards / distance[:, None]
+        free = ~self._context.tracer.occluded(origins, directions, distance * np.float32(1 - 1e-4))
+        at_light = np.abs(dot(normal, directions)) / squared
+        return directions, at_light, pdf_area, np.where(free[:, None], emission, np.float32(0))
 
     def _visibility(self, item: Item, traced: Traced) -> tuple[np.ndarray, np.ndarray]:
         m, n = len(item.probes), item.last - item.first
         reach = self._placement.reach[item.probes]
-        t = np.minimum(np.where(traced.slots < 0, np.inf, traced.hits.t).reshape(n, m), reach)
+        t = np.full(n * m, np.inf, np.float32)
+        t[traced.rows] = traced.t
+        t = np.minimum(t.reshape(n, m), reach)
         cosine = np.maximum(traced.directions @ self._tile_directions.T, 0)
         weight = (cosine ** np.float32(_VISIBILITY_SHARPNESS)).astype(np.float32)
         both = np.concatenate([t, t * t], axis=1)
@@ -206,3 +224,9 @@ def _turn(numbers: np.ndarray, source: int) -> np.ndarray:
     """Another shift on the torus for each further source, so that lamps are not sampled in step."""
     turned = numbers + np.float32(0.381966 * source)
     return turned - np.floor(turned)
+
+
+def _project(basis: np.ndarray, radiance: np.ndarray) -> np.ndarray:
+    """Sum over directions of ``basis`` (n, k) times ``radiance`` (n, m, 3): (m, k, 3)."""
+    n, m, _ = radiance.shape
+    return (basis.T @ radiance.reshape(n, m * 3)).reshape(-1, m, 3).transpose(1, 0, 2)

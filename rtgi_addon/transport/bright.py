@@ -1,0 +1,79 @@
+"""Surfaces on which lamps shine brightly, sampled as light sources of their own.
+
+The floor under a window, the ceiling above a lamp: most of a room's indirect light can start from a few square decimetres,
+which rays find only by luck. The first reflection from such slots is sampled from a pool of points on them (virtual point lights,
+Keller 1997) and balanced against rays that hit them (Veach 1995), so nothing needs clamping.
+"""
+
+import numpy as np
+
+from ..numerics.sampling import hash_u32, sobol_owen
+from .concentration import concentration_limit
+from .context import LightContext
+from .rays import offset_origins
+from .texels import TexelLayout
+from .vectors import dot, luminance
+
+# Points in the pool, by which a patch's pattern of light and shadow is known.
+POOL = 1 << 14
+# Samples toward the pool from each texel.
+TEXEL_SAMPLES = 16
+
+
+class BrightSurfaces:
+    """Bright slots and a pool of points on them. ``count`` is the number of points, 0 where no surface is bright.
+
+    ``pdf_area`` maps a slot's texels to the density [m⁻²] of pool points on them: index it by texel; the last row is 0.
+    """
+
+    def __init__(self, context: LightContext, layout: TexelLayout, slots: np.ndarray, radiance: np.ndarray, light_at, seed: int):
+        """``slots`` (n,) and first-bounce ``radiance`` (n, 3) of all texels; ``light_at(slots, primitive, u, v, uv)`` gives the
+        exact radiance (m, 3) that lamps leave at points, with points and normals (m, 3)."""
+        self._context = context
+        self.count, self.pdf_area = 0, np.zeros(len(slots) + 1, np.float32)
+        if len(slots) == 0:
+            return
+        brightness = luminance(radiance).astype(np.float64)
+        areas = layout.areas(slots)
+        limit = concentration_limit(brightness, areas / areas.sum())
+        rows = np.flatnonzero(brightness > limit)
+        if rows.size == 0:
+            return
+        unique, index = np.unique(slots[rows], return_inverse=True)
+        power = np.bincount(index.reshape(-1), brightness[rows] * areas[rows])
+        slot_area = layout.areas(unique)
+        cdf = np.cumsum(power) / power.sum()
+        xi = sobol_owen(POOL, 5, hash_u32(seed, 0xB51))
+        xi = xi[np.argsort(xi[:, 0], kind="stable")]
+        chosen = np.minimum(np.searchsorted(cdf, xi[:, 0], side="right"), len(unique) - 1)
+        density = (power / power.sum() / slot_area).astype(np.float32)
+        primitive, u, v = (part[0] for part in layout.sample(unique[chosen], xi[None, :, 1:3]))
+        radiance, self._points, self._normals = light_at(unique[chosen], primitive, u, v, xi[:, 3:5])
+        self._radiance, self._density = radiance, density[chosen]
+        self.count = POOL
+        # A texel of a bright slot that is itself dark shares the slot's density: the weights belong to points, not to texels.
+        position = np.minimum(np.searchsorted(unique, slots), len(unique) - 1)
+        self.pdf_area[:-1] = np.where(unique[position] == slots, density[position], 0)
+
+    def connect(self, numbers: np.ndarray, points: np.ndarray, faces: np.ndarray | None):
+        """Join ``points`` (n, 3) to pool points picked by ``numbers`` (n,) in [0, 1).
+
+        Returns direction (n, 3), cosine·/distance² at the pool point (n,) [m⁻²], density (n,) [m⁻²] and radiance (n, 3), which is 0
+        where nothing arrives. ``faces`` (n, 3) are the receivers' face normals, or None in free space.
+        """
+        pick = np.minimum((numbers * self.count).astype(np.int64), self.count - 1)
+        towards = self._points[pick] - points
+        squared = np.maximum(dot(towards, towards), np.float32(1e-20))
+        distance = np.sqrt(squared)
+        direction = towards / distance[:, None]
+        cosine = -dot(self._normals[pick], direction)
+        radiance = self._radiance[pick]
+        open_to = (cosine > 0) & (radiance.max(axis=1) > 0)
+        if faces is not None:
+            open_to &= dot(faces, direction) > 0
+        rows = np.flatnonzero(open_to)
+        start = points[rows] if faces is None else offset_origins(points[rows], faces[rows], direction[rows])
+        end = offset_origins(self._points[pick[rows]], self._normals[pick[rows]], -direction[rows])
+        seen = np.zeros(len(points), bool)
+        seen[rows] = ~self._context.tracer.occluded(start, end - start, np.full(len(rows), 1.0 - 1e-5, np.float32))
+        return direction, cosine / squared, self._density[pick], np.where(seen[:, None], radiance, np.float32(0))

@@ -1,0 +1,150 @@
+"""The texels in use: every slot that a ray has met, split wherever a wall stands across it.
+
+A floor runs on under the walls of two rooms: one value for a cell that both rooms share would carry light from one into the
+other, and a mean over the hidden strip beneath the wall would darken both. So a texel is what can be seen, just above the
+surface, from one point of the slot that a ray really reached (its seed). Where a slot's rim or interior is obstructed, each hit
+in it is tested against the seed, and those that do not see it make further texels with seeds of their own.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .context import LightContext
+from .parallel import CHUNK, parallel_for
+from .texels import TexelLayout
+from .vectors import dot
+
+# A slot is split into at most this many texels; what none of their seeds sees joins the last.
+MAX_PARTS = 4
+# Segments between two points of a texel end this share short, so that neither end's own surface counts.
+_SHORT = np.float32(1.0 - 1e-4)
+
+
+@dataclass(eq=False)
+class SurfaceHits:
+    """Hits on surfaces: ``primitive`` (n,) int32, ``u``, ``v`` (n,), their ``slots`` (n,) int32."""
+
+    primitive: np.ndarray
+    u: np.ndarray
+    v: np.ndarray
+    slots: np.ndarray
+
+    def take(self, rows) -> "SurfaceHits":
+        """The given rows only."""
+        return SurfaceHits(self.primitive[rows], self.u[rows], self.v[rows], self.slots[rows])
+
+    @staticmethod
+    def join(parts: list["SurfaceHits"]) -> "SurfaceHits":
+        """Several sets end to end."""
+        return SurfaceHits(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("primitive", "u", "v", "slots")))
+
+
+class TexelTable:
+    """Grows by ``resolve``; rows are never moved. ``slots`` (n,) int32, ``seeds`` their SurfaceHits, ``mixed`` (n,) bool: the slot
+    is obstructed; ``accepted`` (n, points) bool: which of the slot's sample points ``sample_points`` gives see the seed.
+
+    ``sample_numbers(slots)`` returns (points, n, 2) numbers in [0, 1), the same ones whenever it is asked.
+    """
+
+    def __init__(self, context: LightContext, layout: TexelLayout, sample_numbers, points: int):
+        self._context, self._layout, self._numbers, self._point_count = context, layout, sample_numbers, points
+        self._first = np.full(layout.slot_count, -1, np.int32)
+        empty = np.zeros(0, np.int32)
+        self.seeds = SurfaceHits(empty, np.zeros(0, np.float32), np.zeros(0, np.float32), empty)
+        self._next = empty
+        self.mixed = np.zeros(0, bool)
+        self.accepted = np.zeros((0, points), bool)
+
+    @property
+    def count(self) -> int:
+        """Number of texels."""
+        return len(self.mixed)
+
+    @property
+    def slots(self) -> np.ndarray:
+        """Slot (n,) of each texel."""
+        return self.seeds.slots
+
+    def resolve(self, parts: list[SurfaceHits]) -> list[np.ndarray]:
+        """The texel (n,) int32 of each hit of each part, making texels that do not exist yet.
+
+        The result depends on the parts and their order alone, not on the number of threads.
+        """
+        threads = self._context.threads
+        fresh = [np.flatnonzero(self._first[part.slots] < 0) for part in parts]
+        if any(rows.size for rows in fresh):
+            self._create(SurfaceHits.join([part.take(rows) for part, rows in zip(parts, fresh, strict=True)]), None)
+        texels = [self._first[part.slots] for part in parts]
+        open_rows = [np.flatnonzero(self.mixed[texel]) for texel in texels]
+        for part_number in range(1, MAX_PARTS):
+            blocked = parallel_for(lambda i: self._blocked(parts[i].take(open_rows[i]), texels[i][open_rows[i]]),  # noqa: B023
+                                   len(parts), threads)
+            open_rows = [rows[hidden] for rows, hidden in zip(open_rows, blocked, strict=True)]
+            if not any(rows.size for rows in open_rows):
+                break
+            missing = [rows[self._next[texel[rows]] < 0] for rows, texel in zip(open_rows, texels, strict=True)]
+            if any(rows.size for rows in missing):
+                hits = SurfaceHits.join([part.take(rows) for part, rows in zip(parts, missing, strict=True)])
+                self._create(hits, np.concatenate([texel[rows] for texel, rows in zip(texels, missing, strict=True)]))
+            for texel, rows in zip(texels, open_rows, strict=True):
+                texel[rows] = self._next[texel[rows]]
+        return texels
+
+    def _create(self, hits: SurfaceHits, after: np.ndarray | None) -> None:
+        """Make one texel for each distinct slot of ``hits`` (or each distinct texel that they come ``after``)."""
+        key = hits.slots if after is None else after
+        size = self._layout.slot_count if after is None else self.count
+        chosen = np.full(size, -1, np.int64)
+        # Backwards, so that of several hits with one key the first stays.
+        chosen[key[::-1]] = np.arange(len(key))[::-1]
+        keys = np.flatnonzero(chosen >= 0)
+        seeds = hits.take(chosen[keys])
+        texels = np.arange(self.count, self.count + len(keys), dtype=np.int32)
+        if after is None:
+            self._first[keys] = texels
+        else:
+            self._next[keys] = texels
+        spans = [slice(i, min(i + (CHUNK >> 4), len(keys))) for i in range(0, len(keys), CHUNK >> 4)]
+        surveys = parallel_for(lambda i: self._survey(seeds.take(spans[i])), len(spans), self._context.threads)
+        mixed = np.concatenate([part[0] for part in surveys])
+        self.seeds = SurfaceHits.join([self.seeds, seeds])
+        self._next = np.concatenate([self._next, np.full(len(keys), -1, np.int32)])
+        self.mixed = np.concatenate([self.mixed, mixed if after is None else np.ones(len(keys), bool)])
+        self.accepted = np.concatenate([self.accepted, *(part[1] for part in surveys)])
+
+    def _survey(self, seeds: SurfaceHits) -> tuple[np.ndarray, np.ndarray]:
+        """Whether each slot is obstructed, and which of its sample points (n, points) see the seed."""
+        n = len(seeds.slots)
+        base, normal, lift = self._lifted(seeds)
+        xi = self._numbers(seeds.slots)
+        primitive, u, v = (part.reshape(-1) for part in self._layout.sample(seeds.slots, xi))
+        repeated = np.tile(seeds.slots, self._point_count)
+        points, _, _ = self._lifted(SurfaceHits(primitive, u, v, repeated))
+        hidden = self._segment(np.tile(base, (self._point_count, 1)), points)
+        accepted = ~hidden.reshape(self._point_count, n).T
+        mixed = ~accepted.all(axis=1)
+        rows, _, corners = self._layout.rim(seeds.slots)
+        if rows.size:
+            corners = corners + (normal[rows] * lift[rows, None])[:, None, :]
+            start = np.concatenate([corners[:, i] for i in (0, 1, 2, 3, 0, 1)])
+            end = np.concatenate([corners[:, i] for i in (1, 2, 3, 0, 2, 3)])
+            mixed[rows] |= self._segment(start, end).reshape(6, len(rows)).any(axis=0)
+        return mixed, accepted
+
+    def _blocked(self, hits: SurfaceHits, texel: np.ndarray) -> np.ndarray:
+        if len(texel) == 0:
+            return np.zeros(0, bool)
+        return self._segment(self._lifted(hits)[0], self._lifted(self.seeds.take(texel))[0])
+
+    def _lifted(self, hits: SurfaceHits):
+        geometry = self._context.geometry
+        side = np.where(hits.slots & 1, np.float32(1), np.float32(-1))[:, None]
+        normal = geometry.normals_world[hits.primitive] * side
+        lift = self._layout.lift(hits.slots, hits.primitive)
+        return geometry.points(hits.primitive, hits.u, hits.v) + normal * lift[:, None], normal, lift
+
+    def _segment(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+        direction = end - start
+        hidden = self._context.tracer.occluded(start, direction, np.full(len(start), _SHORT, np.float32))
+        return hidden & (dot(direction, direction) > 0)
