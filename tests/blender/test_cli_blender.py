@@ -4,7 +4,9 @@ how to make a tree with one); the subcommands themselves are tested through the 
 import json
 import os
 import shutil
+import signal
 import subprocess
+import time
 from pathlib import Path
 
 import pytest
@@ -16,17 +18,23 @@ EXTENSION = "bl_ext.user_default.rtgi_addon"
 pytestmark = [pytest.mark.skipif(shutil.which("blender") is None, reason="needs a real Blender on the path"), pytest.mark.slow]
 
 
-def blender(tmp_path, *words, file=None):
-    """Exit code, stdout and the lines on stderr of the command `rtgi` in a Blender that has nothing but this extension."""
+def start(tmp_path, *words, file=None):
+    """The command `rtgi` in a Blender that has nothing but this extension."""
     extension = tmp_path / "user/extensions/user_default/rtgi_addon"
     if not extension.exists():
         extension.parent.mkdir(parents=True)
         extension.symlink_to(ROOT, target_is_directory=True)
     command = ["blender", "-b", "--factory-startup", "--addons", EXTENSION, *([str(file)] if file else []),
                "--command", "rtgi", *map(str, words)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300,
-                          env={**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path / "user")})
-    return done.returncode, done.stdout, done.stderr.splitlines()
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                            env={**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path / "user")})
+
+
+def blender(tmp_path, *words, file=None):
+    """Exit code, stdout and the lines on stderr."""
+    process = start(tmp_path, *words, file=file)
+    out, err = process.communicate(timeout=300)
+    return process.returncode, out, err.splitlines()
 
 
 def bake(tmp_path, *words, file=CORNELL):
@@ -58,6 +66,16 @@ def test_no_file_and_wrong_usage_have_their_codes(tmp_path):
     assert code == 1 and "no .blend is open" in err[-1]
     code, _, err = bake(tmp_path, "--order", "many")
     assert code == 2 and len(err) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_ctrl_c_is_130(tmp_path):
+    process = start(tmp_path, "bake", "--rays", "65536", "--out", tmp_path / "out", file=CORNELL)
+    while process.poll() is None and not (tmp_path / "out.partial/checkpoint.json").exists():
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 130 and err.splitlines()[-1] == "rtgi: cancelled"
     assert not (tmp_path / "out").exists()
 
 
