@@ -206,7 +206,6 @@ class _Stage:
         if self._uv is None:
             return
         image = self._own(bpy.data.images, bpy.data.images.new("rtgi bake", side, side, alpha=True, float_buffer=True))
-        image.generated_color = (0.0, 0.0, 0.0, 0.0)
         node = material.node_tree.nodes.new("ShaderNodeTexImage")
         node.image = image
         material.node_tree.nodes.active = node
@@ -254,10 +253,14 @@ class _Stage:
         context = {"scene": self._scene, "view_layer": view_layer, "object": self._object, "active_object": self._object,
                    "selected_objects": [self._object], "selected_editable_objects": [self._object]}
         target = {"target": "VERTEX_COLORS"} if self._uv is None else {"target": "IMAGE_TEXTURES", "uv_layer": BAKE_UV}
+        for image in self._images.values():  # a cleared image would count as baked all over
+            image.pixels.foreach_set(np.zeros(image.size[0] * image.size[1] * 4, np.float32))
         try:
             with bpy.context.temp_override(**context):
-                bpy.ops.object.bake(type=kind, pass_filter={"COLOR"}, margin=_MARGIN, margin_type="EXTEND", use_clear=True,
-                                    **target)
+                done = bpy.ops.object.bake(type=kind, pass_filter={"COLOR"}, margin=_MARGIN, margin_type="EXTEND",
+                                           use_clear=False, **target)
+            if done != {"FINISHED"}:
+                raise RuntimeError("it was cancelled")
         except RuntimeError as error:
             raise BakeError(f"Cycles could not bake the materials of '{self._request.name}' ({str(error).strip()})",
                             "simplify their nodes, or apply the object's modifiers and try again") from error
@@ -280,7 +283,7 @@ class _Stage:
             filled = pixels[..., 3] > 0.0
         seen = pixels[filled][:, :3]
         if len(seen) and np.ptp(seen, axis=0).max() <= 1e-5 * max(1.0, float(np.abs(seen).max())):
-            return Value.of(seen.mean(axis=0))
+            return Value.of(seen.mean(axis=0, dtype=np.float64))
         return Value(np.ones(3, np.float32), ComputedTexture(name, pixels[..., :3].copy(), False, "EXTEND"), mapping=_MAPPING)
 
 

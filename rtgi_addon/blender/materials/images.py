@@ -10,7 +10,8 @@ from .values import linear_from_srgb, srgb_from_linear
 MAXIMUM_SIDE = 2048
 # What Cycles shows in place of an image it cannot find.
 MISSING_COLOR = (1.0, 0.0, 1.0)
-LINEAR_SPACES = ("Non-Color", "Linear", "Linear Rec.709", "Raw", "Generic Data")
+# Colour spaces whose bytes are scene-linear Rec.709 as they are.
+LINEAR_SPACES = ("Linear", "Linear Rec.709")
 
 
 def is_missing(image) -> bool:
@@ -51,7 +52,8 @@ class ImageCache:
         stored = np.empty(width * height * image.channels, np.float32)
         image.pixels.foreach_get(stored)
         stored = stored.reshape(height, width, image.channels)
-        srgb = _is_srgb(image)
+        space = image.colorspace_settings
+        srgb = not (image.is_float or space.is_data or space.name in LINEAR_SPACES)
         pixels = self._reduced(image, stored, srgb)
         return _with_alpha_applied(image, pixels, srgb, with_alpha)
 
@@ -82,29 +84,21 @@ class ImageCache:
             self._notes.append(line)
 
 
-def _is_srgb(image) -> bool:
-    """Whether the stored numbers are sRGB-encoded: float buffers are always scene-linear already."""
-    return not image.is_float and image.colorspace_settings.name not in LINEAR_SPACES
-
-
 def _with_alpha_applied(image, pixels: np.ndarray, srgb: bool, with_alpha: bool) -> tuple[np.ndarray, bool]:
-    """Bring alpha to what Cycles samples and store 8-bit sources as bytes."""
+    """Bring alpha to what Cycles samples (encoded colour is premultiplied as it is) and store 8-bit sources as bytes."""
     if pixels.shape[2] == 2:
         pixels = np.dstack([pixels[..., :1]] * 3 + [pixels[..., 1:]])
-    transparent = pixels.shape[2] == 4 and bool(np.any(pixels[..., 3] < 1.0))
-    if transparent and image.alpha_mode == "NONE":
-        pixels[..., 3] = 1.0
-        transparent = False
-    if pixels.shape[2] == 4 and not transparent:
+    if pixels.shape[2] == 4 and (image.alpha_mode == "NONE" or not np.any(pixels[..., 3] < 1.0)):
         pixels = pixels[..., :3]
-    data = image.colorspace_settings.is_data
-    if transparent and not data and image.alpha_mode in ("STRAIGHT", "PREMUL"):
-        alpha = pixels[..., 3:]
-        if with_alpha and image.is_float:
-            pixels[..., :3] = np.divide(pixels[..., :3], alpha, out=np.zeros_like(pixels[..., :3]), where=alpha > 0)
-        elif not with_alpha and not image.is_float:
-            linear = linear_from_srgb(pixels[..., :3]) if srgb else pixels[..., :3]
-            pixels[..., :3] = srgb_from_linear(linear * alpha) if srgb else linear * alpha
-    if image.is_float:
-        return np.ascontiguousarray(pixels), False
-    return np.rint(np.clip(pixels, 0.0, 1.0) * 255.0).astype(np.uint8), srgb
+    elif pixels.shape[2] == 4 and not image.colorspace_settings.is_data:
+        color, alpha = pixels[..., :3], pixels[..., 3:]
+        if image.alpha_mode == "STRAIGHT" and not with_alpha:
+            color *= alpha
+        elif image.alpha_mode == "PREMUL" and with_alpha:
+            np.divide(color, alpha, out=color, where=alpha > 0.0)
+    if not image.is_float and pixels.max() <= 1.0:
+        return np.rint(np.maximum(pixels, 0.0) * 255.0).astype(np.uint8), srgb
+    pixels = np.ascontiguousarray(pixels)
+    if srgb:
+        pixels[..., :3] = linear_from_srgb(pixels[..., :3])
+    return pixels, False

@@ -52,8 +52,11 @@ class NodeReader:
             out, node = link.from_socket, link.from_node
             types.append(out.type)
             if node.mute:
-                inside = next((inner for inner in node.internal_links if inner.to_socket == out), None)
-                socket = _Nothing(out.type) if inside is None else inside.from_socket
+                inside = next((inner.from_socket for inner in node.internal_links if inner.to_socket == out), None)
+                # From 5.0 a muted node that nothing enters counts as no link: the input keeps its own value.
+                if inside is None or not (inside.is_linked or bpy.app.version < (5, 0)):
+                    return (socket, path), types[-2::-1]
+                socket = inside
             elif node.bl_idname == "NodeReroute":
                 socket = node.inputs[0]
             elif node.bl_idname == "ShaderNodeGroup":

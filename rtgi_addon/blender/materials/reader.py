@@ -61,7 +61,8 @@ class MaterialReader:
 
     def request_bake(self, evaluated_object, materials, world_from_local) -> BakeRequest:
         """Copy the evaluated geometry, to bake those ``materials`` (one bpy material or None per slot) that ``read`` refuses."""
-        mesh = bpy.data.meshes.new_from_object(evaluated_object, preserve_all_data_layers=True, depsgraph=self._depsgraph)
+        # Asked to preserve all layers, this would evaluate the original anew and lose instances made by geometry nodes.
+        mesh = bpy.data.meshes.new_from_object(evaluated_object)
         originals = [None if material is None else material.original for material in materials]
         slots = tuple(slot for slot, material in enumerate(originals) if self.read(material) is None)
         request = BakeRequest(evaluated_object.name, mesh, originals, slots, world_from_local.copy(),
@@ -91,7 +92,7 @@ class MaterialReader:
         return replace(mesh, uv_layers=uv_layers, attributes=attributes), materials
 
     def _from_nodes(self, material) -> Material | None:
-        if material.node_tree is None or not material.use_nodes:
+        if material.node_tree is None or (bpy.app.version < (5, 0) and not material.use_nodes):  # always on from 5.0
             color = Value.of(tuple(material.diffuse_color)[:3])
             return self._material(material, Surface(color, base_color=color), "nodes")
         attributes: set[str] = set()

@@ -221,7 +221,6 @@ _READERS = {
     "ShaderNodeBsdfDiffuse": ShaderReader._diffuse,
     "ShaderNodeSubsurfaceScattering": ShaderReader._diffuse,
     "ShaderNodeBsdfTranslucent": ShaderReader._translucent,
-    "ShaderNodeBsdfGlossy": ShaderReader._glossy,
     "ShaderNodeBsdfAnisotropic": ShaderReader._glossy,
     "ShaderNodeBsdfMetallic": ShaderReader._metallic,
     "ShaderNodeBsdfGlass": ShaderReader._glass,

@@ -67,6 +67,8 @@ class Value:
         a, b = Value.of(self), Value.of(other)
         if a.is_constant:
             a, b = b, a
+        if b.equals(0.0):
+            return a
         if a.cut is None and b.is_constant:
             if a.is_constant:
                 return Value.of(a.constant + b.constant)
@@ -102,12 +104,13 @@ class Value:
         return self * -1.0
 
     def __sub__(self, other) -> "Value":
-        return self + -Value.of(other)
+        other = Value.of(other)
+        if other.cut is not None and self.equals(1.0):
+            return replace(other, cut=(other.cut[0], not other.cut[1]))
+        return self + -other
 
     def __rsub__(self, other) -> "Value":
-        if self.cut is not None and Value.of(other).equals(1.0):
-            return replace(self, cut=(self.cut[0], not self.cut[1]))
-        return Value.of(other) + -self
+        return Value.of(other) - self
 
     def greater_than(self, threshold: float, above: bool = True) -> "Value":
         """1 where the value is above ``threshold`` (below it if not ``above``), else 0."""
@@ -188,15 +191,15 @@ def apply(function: Callable, *values: Value) -> Value:
 def texels(value: Value) -> np.ndarray:
     """(height, width, 3) float32 scene-linear: a textured value at its texels."""
     pixels = value.texture.pixels
-    component = "rgba".find(value.texture_channel)
-    if component >= 0:
-        rgb = pixels[..., min(component, pixels.shape[2] - 1)][..., None]
-    else:
+    alpha = value.texture_channel == "a"
+    if value.texture_channel == "rgb":
         rgb = pixels[..., :3]
+    else:
+        rgb = pixels[..., min("rgba".index(value.texture_channel), pixels.shape[2] - 1)][..., None]
     if pixels.dtype == np.uint8:
         codes = np.arange(256, dtype=np.float32) / 255.0
-        rgb = (linear_from_srgb(codes) if value.texture.srgb and component != 3 else codes)[rgb]
-    elif value.texture.srgb and component != 3:
+        rgb = (linear_from_srgb(codes) if value.texture.srgb and not alpha else codes)[rgb]
+    elif value.texture.srgb and not alpha:
         rgb = linear_from_srgb(rgb)
     result = rgb * value.constant + (np.float32(0.0) if value.offset is None else value.offset)
     if value.cut is not None:

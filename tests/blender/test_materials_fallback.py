@@ -1,0 +1,292 @@
+"""Materials that nodes do not tell: baked by Cycles, equal to Cycles, and nothing left behind."""
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy", reason="needs Blender or its Python module")
+mathutils = pytest.importorskip("mathutils")
+
+from materials_testing import (  # noqa: E402
+    arrays_of,
+    at_corners,
+    cycles_bake,
+    enable_cycles,
+    glowing_material,
+    grid_object,
+    names_in_file,
+    new_material,
+    random_image,
+    read_object,
+    sampled,
+)
+
+from rtgi_addon.blender.materials import MaterialReader, fallback  # noqa: E402
+from rtgi_addon.errors import BakeError  # noqa: E402
+
+pytestmark = pytest.mark.blender
+
+
+def noise(tree, scale=3.0):
+    node = tree.nodes.new("ShaderNodeTexNoise")
+    node.inputs["Scale"].default_value = scale
+    return node.outputs["Color"]
+
+
+def object_noise(tree):
+    node = tree.nodes.new("ShaderNodeTexNoise")
+    tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs["Object"], node.inputs["Vector"])
+    return node.outputs["Color"]
+
+
+def ramp_of_noise(tree):
+    node = tree.nodes.new("ShaderNodeValToRGB")
+    node.color_ramp.elements[0].color = (0.9, 0.2, 0.1, 1.0)
+    tree.links.new(noise(tree), node.inputs[0])
+    return node.outputs["Color"]
+
+
+def world_position(tree):
+    node = tree.nodes.new("ShaderNodeVectorMath")
+    node.operation = "SCALE"
+    node.inputs["Scale"].default_value = 0.1
+    tree.links.new(tree.nodes.new("ShaderNodeNewGeometry").outputs["Position"], node.inputs[0])
+    return node.outputs[0]
+
+
+def noise_in_groups(tree):
+    """Noise within a group within a group."""
+    trees = [tree]
+    for name in ("outer", "inner"):
+        group = bpy.data.node_groups.new(name, "ShaderNodeTree")
+        group.interface.new_socket("Result", in_out="OUTPUT", socket_type="NodeSocketColor")
+        trees.append(group)
+    source = noise(trees[2])
+    for group, user in ((trees[2], trees[1]), (trees[1], trees[0])):
+        group.links.new(source, group.nodes.new("NodeGroupOutput").inputs[0])
+        node = user.nodes.new("ShaderNodeGroup")
+        node.node_tree = group
+        source = node.outputs[0]
+    return source
+
+
+def screen_of_images(tree):
+    node = tree.nodes.new("ShaderNodeMix")
+    node.data_type, node.blend_type = "RGBA", "SCREEN"
+    node.inputs[0].default_value = 0.7
+    for identifier, seed in (("A_Color", 1), ("B_Color", 2)):
+        image = tree.nodes.new("ShaderNodeTexImage")
+        image.image = random_image(seed=seed, high=0.4)
+        tree.links.new(image.outputs["Color"], next(socket for socket in node.inputs if socket.identifier == identifier))
+    return next(socket for socket in node.outputs if socket.identifier == "Result_Color")
+
+
+def box_projection(tree):
+    node = tree.nodes.new("ShaderNodeTexImage")
+    node.image, node.projection = random_image(), "BOX"
+    tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"], node.inputs["Vector"])
+    return node.outputs["Color"]
+
+
+def constant_hue(tree):
+    node = tree.nodes.new("ShaderNodeHueSaturation")
+    node.inputs["Hue"].default_value = 0.3
+    node.inputs["Color"].default_value = (0.8, 0.3, 0.1, 1.0)
+    return node.outputs[0]
+
+
+PROCEDURAL = {"noise": noise, "object noise": object_noise, "ramp": ramp_of_noise, "position": world_position,
+              "groups": noise_in_groups, "screen": screen_of_images, "box": box_projection, "hue": constant_hue}
+
+
+@pytest.fixture(autouse=True)
+def small_textures(monkeypatch):
+    """Quick bakes."""
+    monkeypatch.setattr(fallback, "RESOLUTION", 512)
+
+
+@pytest.fixture(params=["texture", "corners"])
+def carrier(request, monkeypatch):
+    """Both ways a bake can be carried: a texture over its own UV map, or corner attributes."""
+    if request.param == "corners":
+        monkeypatch.setattr(fallback, "TEXTURE_POLYGONS", 0)
+    return request.param
+
+
+@pytest.mark.parametrize("name", PROCEDURAL)
+def test_a_baked_material_equals_cycles(empty_blend, carrier, name):
+    thing = grid_object(glowing_material(PROCEDURAL[name]), cells=7)
+    thing.location, thing.rotation_euler, thing.scale = (2.0, 3.0, 4.0), (0.2, 0.4, 0.6), (1.2, 0.9, 1.0)
+    bpy.context.view_layer.update()
+    (material,), mesh, reader, loops = read_object(thing)
+    assert material.extraction == "cycles-bake" and material.albedo.is_constant == (name == "hue")
+    assert [note for note in reader.notes if "material" in note and "Cycles" in note]
+    for channel, kind in ((material.albedo, "DIFFUSE"), (material.emission, "EMIT")):
+        difference = np.abs(at_corners(channel, mesh) - cycles_bake(thing, kind)[loops])
+        assert difference.max() < 0.04 and difference.mean() < 5e-3  # half a texel at the rim of a patch
+
+
+def test_a_texture_resolves_what_corners_cannot(empty_blend):
+    def checker(tree):
+        node = tree.nodes.new("ShaderNodeTexChecker")
+        node.inputs["Scale"].default_value = 10.0
+        node.inputs["Color1"].default_value, node.inputs["Color2"].default_value = (0.8, 0.1, 0.1, 1.0), (0.1, 0.2, 0.7, 1.0)
+        tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs["Object"], node.inputs["Vector"])
+        return node.outputs["Color"]
+
+    thing = grid_object(glowing_material(checker), cells=1)
+    thing.data.transform(mathutils.Matrix.Translation((0.0, 0.0, 0.05)))  # off the boundary of the checker's cells
+    (material,), mesh, _reader, _loops = read_object(thing)
+    point = np.random.default_rng(0).uniform(-0.95, 0.95, (400, 2))
+    cell = np.floor(point * 10.0).astype(int)
+    point = point[np.all(np.abs(point * 10.0 - cell - 0.5) < 0.4, axis=1)]
+    cell = np.floor(point * 10.0).astype(int)
+    corners = mesh.vertices_local[mesh.triangles].reshape(-1, 3)[:, :2]
+    corner_uv = mesh.uv_layers[fallback.BAKE_UV].reshape(-1, 2)
+    uv_of_point = np.linalg.lstsq(np.c_[corners, np.ones(len(corners))], corner_uv, rcond=None)[0]
+    got = sampled(material.albedo.texture, "rgb", np.c_[point, np.ones(len(point))] @ uv_of_point)
+    even = (cell.sum(axis=1) % 2 == 0)[:, None]
+    assert np.abs(got - np.where(even, (0.1, 0.2, 0.7), (0.8, 0.1, 0.1))).max() < 0.02
+
+
+def test_a_closure_without_a_formula_is_baked_by_its_diffuse_colour(empty_blend):
+    material, output = new_material()
+    toon = material.node_tree.nodes.new("ShaderNodeBsdfToon")
+    toon.inputs["Color"].default_value = (0.3, 0.5, 0.2, 1.0)
+    material.node_tree.links.new(toon.outputs[0], output.inputs["Surface"])
+    (read,), _mesh, reader, _loops = read_object(grid_object(material))
+    assert np.allclose(read.albedo.constant, (0.3, 0.5, 0.2), atol=1e-4) and not read.is_emissive
+    assert any("Toon" in note for note in reader.notes)
+
+
+def test_unreadable_coverage_and_factor_are_baked_too(empty_blend):
+    material, output = new_material()
+    tree = material.node_tree
+    mix, clear, diffuse = (tree.nodes.new(f"ShaderNode{kind}") for kind in ("MixShader", "BsdfTransparent", "BsdfDiffuse"))
+    tree.links.new(noise(tree), mix.inputs[0])
+    tree.links.new(clear.outputs[0], mix.inputs[1])
+    tree.links.new(diffuse.outputs[0], mix.inputs[2])
+    tree.links.new(mix.outputs[0], output.inputs["Surface"])
+    diffuse.inputs["Color"].default_value = (0.7, 0.6, 0.5, 1.0)
+    thing = grid_object(material)
+    (read,), mesh, _reader, loops = read_object(thing)
+    assert np.allclose(read.albedo.constant, (0.7, 0.6, 0.5)) and not read.is_opaque
+    premultiplied = cycles_bake(thing, "DIFFUSE")[loops]
+    assert np.abs(at_corners(read.alpha, mesh) * read.albedo.constant - premultiplied).max() < 0.02
+
+
+def test_only_the_slots_that_need_it_are_baked(empty_blend):
+    thing = grid_object(glowing_material(noise))
+    plain = glowing_material(lambda tree: tree.nodes.new("ShaderNodeRGB").outputs[0])
+    for material in (plain, None, glowing_material(object_noise)):
+        thing.data.materials.append(material)
+    thing.data.polygons.foreach_set("material_index", np.arange(len(thing.data.polygons), dtype=np.int32) % 4)
+    materials, mesh, _reader, loops = read_object(thing)
+    assert [material.extraction for material in materials] == ["cycles-bake", "nodes", "nodes", "cycles-bake"]
+    expected = cycles_bake(thing, "DIFFUSE")[loops]
+    for slot in (0, 3):
+        chosen = mesh.triangle_material == slot
+        assert np.abs(at_corners(materials[slot].albedo, mesh) - expected)[chosen].max() < 0.04
+
+
+def test_evaluated_geometry_is_baked(empty_blend):
+    thing = grid_object(glowing_material(object_noise), cells=2)
+    thing.shape_key_add(name="Basis")
+    raised = thing.shape_key_add(name="raised")
+    raised.data[0].co.z, raised.value = 0.8, 0.5
+    thing.modifiers.new("array", "ARRAY").count = 3
+    bpy.context.view_layer.update()
+    before = names_in_file()
+    (material,), mesh, _reader, loops = read_object(thing)
+    assert len(mesh.triangles) == 3 * 8 and np.isclose(mesh.vertices_local[:, 2].max(), 0.4) and names_in_file() == before
+    applied = bpy.data.objects.new("applied", bpy.data.meshes.new_from_object(
+        thing.evaluated_get(bpy.context.evaluated_depsgraph_get())))
+    bpy.context.scene.collection.objects.link(applied)
+    assert np.abs(at_corners(material.albedo, mesh) - cycles_bake(applied, "DIFFUSE")[loops]).max() < 0.04
+
+
+def test_curves_and_instanced_geometry_are_baked(empty_blend):
+    material = glowing_material(noise)
+    text = bpy.data.objects.new("text", bpy.data.curves.new("text", "FONT"))
+    text.data.body, text.data.extrude = "probe", 0.1
+    text.data.materials.append(material)
+    tree = bpy.data.node_groups.new("instances", "GeometryNodeTree")
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    cube, line, place, dress = (tree.nodes.new(f"GeometryNode{kind}") for kind in (
+        "MeshCube", "MeshLine", "InstanceOnPoints", "SetMaterial"))
+    end = tree.nodes.new("NodeGroupOutput")
+    dress.inputs["Material"].default_value = material
+    tree.links.new(cube.outputs["Mesh"], dress.inputs["Geometry"])
+    tree.links.new(line.outputs["Mesh"], place.inputs["Points"])
+    tree.links.new(dress.outputs["Geometry"], place.inputs["Instance"])
+    tree.links.new(place.outputs["Instances"], end.inputs[0])
+    cubes = grid_object(None, name="cubes")
+    cubes.modifiers.new("nodes", "NODES").node_group = tree
+    bpy.context.scene.collection.objects.link(text)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    with MaterialReader(bpy.context.scene, depsgraph) as reader:
+        requests = []
+        for instance in depsgraph.object_instances:
+            thing = instance.object
+            data = thing.data
+            if thing.type != "MESH" or not len(data.polygons):
+                continue
+            requests.append((reader.request_bake(thing, list(data.materials), instance.matrix_world), *arrays_of(data)))
+        assert {request.name for request, *_rest in requests} == {"text", "cubes"}
+        for request, mesh, loops in requests:
+            mesh, materials = reader.bake(request, mesh, loops)
+            values = at_corners(next(iter(materials.values())).albedo, mesh)
+            assert 0.1 < values.mean() < 0.9 and values.std() > 0.01
+
+
+def test_nothing_is_left_behind(empty_blend, carrier, monkeypatch):
+    enable_cycles()
+    thing, other = grid_object(glowing_material(noise_in_groups)), grid_object(None, name="other")
+    other.select_set(True)
+    bpy.context.view_layer.objects.active = other
+    bpy.context.scene.render.engine = "BLENDER_WORKBENCH"
+    before, attributes = names_in_file(), thing.data.attributes.keys()
+    read_object(thing)
+    assert names_in_file() == before and thing.data.attributes.keys() == attributes
+    monkeypatch.setattr(fallback._Stage, "result", lambda *_: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        read_object(thing)
+    assert names_in_file() == before and thing.data.attributes.keys() == attributes
+    assert bpy.context.view_layer.objects.active == other and bpy.context.selected_objects == [other]
+    assert bpy.context.scene.render.engine == "BLENDER_WORKBENCH" and thing.mode == "OBJECT"
+
+
+def test_requests_never_baked_are_removed(empty_blend):
+    thing = grid_object(glowing_material(noise))
+    before = names_in_file()
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    with MaterialReader(bpy.context.scene, depsgraph) as reader:
+        reader.request_bake(thing.evaluated_get(depsgraph), [thing.data.materials[0]], thing.matrix_world)
+        assert names_in_file() != before
+    assert names_in_file() == before
+
+
+def test_a_failed_bake_is_an_error_that_names_the_object(empty_blend, monkeypatch):
+    thing = grid_object(glowing_material(noise))
+    before = names_in_file()
+    monkeypatch.setattr(fallback._Stage, "_add_target", lambda stage, *_: stage._images.clear())
+    with pytest.raises(BakeError, match="grid"):
+        read_object(thing)
+    assert names_in_file() == before
+
+
+def test_patches_of_the_atlas_do_not_overlap():
+    from rtgi_addon.blender.materials.atlas import PADDING, polygon_uv
+
+    rng = np.random.default_rng(3)
+    size = rng.uniform(0.01, 2.0, (200, 2))
+    quad = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    turn, _upper = np.linalg.qr(rng.normal(size=(3, 3)))
+    corners = (np.c_[(quad[None] * size[:, None]).reshape(-1, 2), np.zeros(800)]) @ turn.T
+    normals = np.repeat(np.cross(turn[:, 0], turn[:, 1])[None], 200, axis=0)
+    uv = polygon_uv(corners, normals, np.arange(200) * 4, np.full(200, 4), 512).reshape(200, 4, 2) * 512
+    low, high = uv.min(axis=1) - PADDING, uv.max(axis=1) + PADDING
+    assert low.min() >= -1e-3 and high.max() <= 512 + 1e-3
+    apart = np.any((low[:, None] >= high[None] - 1e-3) | (high[:, None] <= low[None] + 1e-3), axis=-1)
+    assert np.all(apart | np.eye(200, dtype=bool))
+    area = np.prod(high - low - 2 * PADDING, axis=1)
+    assert np.allclose(area / area[0], np.prod(size, axis=1) / np.prod(size[0]), rtol=1e-3)
