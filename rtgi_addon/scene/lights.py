@@ -40,8 +40,8 @@ class SpotLight:
     """A point light within a cone about ``direction_world`` (3,) unit. ``cone_angle`` is the full angle [rad]; ``blend`` 0–1
     the soft edge: intensity × smoothstep((z − cos(cone/2)) / (blend·(1 − cos(cone/2)))), z = cosine to the axis, as in Cycles.
 
-    ``world_from_local`` (3, 3) carries a scaled or sheared lamp's elliptical cone (columns: its axes; light travels along −Z): z is
-    then that of −normalize(world_from_local⁻¹·d). The direction d leads from the point sampled on the lamp to the receiver.
+    ``world_from_local`` (3, 3) carries a scaled or sheared lamp's elliptical cone (columns: its axes; light travels along −Z): z
+    is then that of −normalize(world_from_local⁻¹·d). The direction d leads from the point sampled on the lamp to the receiver.
     """
 
     name: str
