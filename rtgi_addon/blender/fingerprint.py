@@ -6,6 +6,7 @@ volumes and the bake's own settings. It may miss a change (a texture painted ove
 
 import hashlib
 from dataclasses import astuple
+from functools import cache
 
 import bpy
 import numpy as np
@@ -75,11 +76,14 @@ def _add_nodes(digest, owner, seen: set) -> None:
 
 
 def _add_struct(digest, struct) -> None:
-    """The plain properties that a Blender struct declares."""
-    for declared in struct.bl_rna.properties:
-        if declared.type not in _PLAIN or declared.is_readonly or declared.identifier in _IGNORED:
-            continue
-        if declared.identifier.startswith("bl_"):
-            continue
-        value = getattr(struct, declared.identifier)
-        digest.update(repr(tuple(value) if getattr(declared, "is_array", False) else value).encode())
+    for name, is_array in _plain_properties(type(struct)):
+        value = getattr(struct, name)
+        digest.update(repr(tuple(value) if is_array else value).encode())
+
+
+@cache
+def _plain_properties(kind: type) -> tuple[tuple[str, bool], ...]:
+    """(name, whether it is an array) of every plain property that a type of Blender struct declares."""
+    return tuple((declared.identifier, getattr(declared, "is_array", False)) for declared in kind.bl_rna.properties
+                 if declared.type in _PLAIN and not declared.is_readonly and declared.identifier not in _IGNORED
+                 and not declared.identifier.startswith("bl_"))

@@ -10,7 +10,7 @@ from .fingerprint import fingerprint
 from .session import redraw, session
 
 # Scenes whose digest takes longer than this are not compared again: any change to them counts as one [s].
-_PATIENCE = 0.1
+_PATIENCE = 0.25
 _DELAY = 0.5
 _slow: set[str] = set()
 

@@ -68,7 +68,7 @@ def draw_actions(layout, context, width: int) -> None:
     button.enabled = not stopping
     button.operator("rtgi.cancel", text="", icon="CANCEL")
     step = _sentence(report.label) or "Starting"
-    draw_lines(layout, step if session.baking == context.scene.name else f"{session.baking}: {step}", width, "TIME")
+    draw_lines(layout, step if session.baking == context.scene.name else f"{session.baking}: {step}", width, "SORTTIME")
 
 
 def draw_volumes(layout, context, width: int) -> None:

@@ -80,8 +80,9 @@ def blender_property(technique: Technique, item):
 
 
 def _middle(min: float = 0.0, max: float = 1.0) -> float:
-    """Where a number starts that is unset by default: the geometric middle of its range, counted from 1 if that begins at 0."""
-    return float(np.sqrt((min if min > 0 else 1.0) * max))
+    """Where a number starts that is unset by default: the geometric middle of its range, counted from 1 if that begins at 0, to
+    one digit."""
+    return float(f"{np.sqrt((min if min > 0 else 1.0) * max):.0e}")
 
 
 def settings_group(technique: Technique, overrides: bool) -> type:

@@ -118,3 +118,23 @@ print("RELOADED", after is not before, len(classes), bpy.context.scene.rtgi.tech
     ran = blender("--background", "--python-exit-code", "9", "--python", script)
     assert ran.returncode == 0, ran.stderr
     assert "RELOADED True 1 probes" in ran.stdout
+
+
+def test_blender_quits_in_the_middle_of_a_bake(blender, tmp_path):
+    script = tmp_path / "quit.py"
+    script.write_text(f"""
+import bpy
+def start():
+    scene = bpy.context.scene
+    scene.rtgi.output, scene.rtgi.mode, scene.rtgi.technique_probes.rays = {str(tmp_path / "bake")!r}, "RAYS", 1 << 20
+    window = bpy.context.window_manager.windows[0]
+    area = next(area for area in window.screen.areas if area.type == "VIEW_3D")
+    with bpy.context.temp_override(window=window, area=area, region=area.regions[-1]):
+        print("STARTED", bpy.ops.rtgi.bake("INVOKE_DEFAULT"))
+    bpy.app.timers.register(bpy.ops.wm.quit_blender, first_interval=1.0)
+bpy.app.timers.register(start, first_interval=1.0)
+""")
+    ran = blender("-p", 0, 0, 1440, 900, REPOSITORY / "sample_blends/cornell_box.blend", "--python", script)
+    assert "STARTED {'RUNNING_MODAL'}" in ran.stdout
+    assert ran.returncode == 0, ran.stderr
+    assert not (tmp_path / "bake").exists()

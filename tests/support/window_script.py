@@ -102,6 +102,23 @@ def show_settings():
     window().event_simulate("LEFTMOUSE", "RELEASE", x=x - 180, y=y)
     properties.spaces.active.search_filter = "RTGI"
     yield 0.7
+    window().event_simulate("MOUSEMOVE", "NOTHING", x=properties.x + 200, y=properties.y + 200)
+    for _ in range(20):
+        press("WHEELDOWNMOUSE", properties.x + 200, properties.y + 200)
+    yield 0.7
+
+
+def show_volume():
+    """Select the volume and turn the properties editor to its data."""
+    volume = next(obj for obj in window().scene.objects if obj.type == "LIGHT_PROBE")
+    with in_view():
+        bpy.ops.object.select_all(action="DESELECT")
+    volume.select_set(True)
+    window().view_layer.objects.active = volume
+    volume.data.rtgi.technique_probes.override_order = True
+    yield 0.3
+    area("PROPERTIES").spaces.active.context = "DATA"
+    yield 0.7
 
 
 def click_bake():
@@ -209,13 +226,20 @@ def story():
     yield from show_settings()
     with in_view():
         bpy.ops.rtgi.bake("INVOKE_DEFAULT")
-    yield from until(lambda: session().worker.report.fraction > 0.3 or ended())
-    yield 0.2
-    picture("baking")
     yield from until(ended)
     yield 1.5
-    picture("panel")
+    picture("baked")
     seen["whole bake"] = bundle()
+    with in_view():
+        window().scene.rtgi.technique_probes.error = 0.001
+        bpy.ops.rtgi.bake("INVOKE_DEFAULT")
+    yield from until(lambda: session().worker.report.fraction > 0.3 or ended())
+    yield 0.3
+    picture("panel")
+    session().worker.cancel()
+    yield from until(ended)
+    yield from show_volume()
+    picture("volume")
 
 
 def run(steps):
