@@ -1,4 +1,5 @@
-"""Make the sample .blend files: ``python sample_blends/build.py [names…]`` or ``blender -b -P sample_blends/build.py -- [names…]``.
+"""Make the sample .blend files: ``python sample_blends/build.py [names…]``, or with a real Blender
+``blender -b -P sample_blends/build.py -- [names…]``.
 
 Each sample is built from nothing, with fixed seeds, and saved compressed. Run it with the oldest supported Blender (the bpy
 module 4.5), so that every later version opens the files without complaint. ``--thumbnails DIR`` also renders a small picture

@@ -25,7 +25,8 @@ def adversarial():
     faces = list(kit.BOX_FACES.values())
     kit.mesh_object("Half Flipped", kit.box_vertices((-0.4, 1.2, 0.002), (0.2, 1.8, 0.9)),
                     [face if i % 2 else tuple(reversed(face)) for i, face in enumerate(faces)], blue)
-    fins = [(0, 0, 0), (0, 0, 0.8), (0.5, 0, 0), (0.5, 0, 0.8), (-0.4, 0.3, 0), (-0.4, 0.3, 0.8), (-0.2, -0.45, 0), (-0.2, -0.45, 0.8)]
+    fins = [(0, 0, 0), (0, 0, 0.8), (0.5, 0, 0), (0.5, 0, 0.8), (-0.4, 0.3, 0), (-0.4, 0.3, 0.8),
+            (-0.2, -0.45, 0), (-0.2, -0.45, 0.8)]
     non_manifold = kit.mesh_object("Three Fins on One Edge", fins, [(0, 2, 3, 1), (0, 4, 5, 1), (0, 6, 7, 1)], plaster)
     non_manifold.location = (1.2, 1.2, 0.002)
     kit.box("Open Box", (-1.8, -1.8, 0.002), (-1.1, -1.1, 0.6), kit.material("Red", (0.6, 0.1, 0.08)), without=("+z",))
@@ -45,7 +46,8 @@ def adversarial():
 def degenerate_mesh(coat) -> None:
     """A tilted quad together with faces without area (doubled points, points on a line) and edges without a face."""
     mesh = bpy.data.meshes.new("Degenerate")
-    vertices = [(0, 0, 0), (0.6, 0, 0), (0.6, 0.5, 0.3), (0, 0.5, 0.3), (0.3, 0, 0), (0.6, 0, 0), (0.2, 0.9, 0.4), (0.9, 0.9, 0.4)]
+    vertices = [(0, 0, 0), (0.6, 0, 0), (0.6, 0.5, 0.3), (0, 0.5, 0.3), (0.3, 0, 0), (0.6, 0, 0),
+                (0.2, 0.9, 0.4), (0.9, 0.9, 0.4)]
     mesh.from_pydata(vertices, [(6, 7)], [(0, 1, 2, 3), (0, 4, 1), (1, 5, 2)])
     mesh.materials.append(coat)
     mesh.update()

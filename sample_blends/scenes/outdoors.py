@@ -16,8 +16,10 @@ def sky_courtyard():
     kit.world(bpy.context.scene, (0.62, 0.78, 1.0), 1.4)
     kit.box("Ground", (-4.3, -3.3, -0.3), (4.3, 3.3, 0.0), stone)
     for name, low, high, coat in (
-            ("Wall West", (-4.3, -3.3, -0.1), (-4.0, 3.3, 3.5), brick), ("Wall East", (4.0, -3.3, -0.1), (4.3, 3.3, 3.5), stone),
-            ("Wall South", (-4.1, -3.3, -0.1), (4.1, -3.0, 3.5), stone), ("Wall North", (-4.1, 3.0, -0.1), (4.1, 3.3, 3.5), stone)):
+            ("Wall West", (-4.3, -3.3, -0.1), (-4.0, 3.3, 3.5), brick),
+            ("Wall East", (4.0, -3.3, -0.1), (4.3, 3.3, 3.5), stone),
+            ("Wall South", (-4.1, -3.3, -0.1), (4.1, -3.0, 3.5), stone),
+            ("Wall North", (-4.1, 3.0, -0.1), (4.1, 3.3, 3.5), stone)):
         kit.box(name, low, high, coat)
     kit.box("Lawn", (-1.6, -1.4, -0.05), (1.6, 1.2, 0.06), grass)
     kit.box("Loggia Roof", (-4.05, 1.7, 2.4), (4.05, 3.05, 2.6), stone)
