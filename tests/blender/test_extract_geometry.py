@@ -10,6 +10,8 @@ from mathutils import Euler, Matrix  # noqa: E402
 from rtgi_addon.blender.extract import extract_scene  # noqa: E402
 from rtgi_addon.blender.extract.meshes import MeshReader  # noqa: E402
 from rtgi_addon.errors import UsageError  # noqa: E402
+from rtgi_addon.transport.geometry import flatten  # noqa: E402
+from rtgi_addon.transport.surfaces import Surfaces  # noqa: E402
 
 
 def link(name, data, matrix=None, collection=None):
@@ -300,13 +302,49 @@ def test_linked_and_overridden_objects(empty_blend, tmp_path):
     assert len(scene.meshes) == 1
 
 
-def test_view_layer_material_override(empty_blend):
+def test_view_layer_overrides(empty_blend):
     mesh = cube_mesh()
     mesh.materials.append(material("red", (0.7, 0.1, 0.1)))
     link("cube", mesh)
+    world = bpy.data.worlds.new("studio")
+    if world.node_tree is None:
+        world.use_nodes = True
+    world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.25, 0.5, 0.75, 1)
     bpy.context.view_layer.material_override = material("clay", (0.5, 0.5, 0.5))
+    bpy.context.view_layer.world_override = world
     scene = extract_scene()
     assert [entry.name for entry in scene.materials] == ["clay"]
+    np.testing.assert_allclose(scene.world.equirect, [[[0.25, 0.5, 0.75]]])
+
+
+def test_a_material_that_takes_cycles_is_baked_once_for_all_instances(empty_blend):
+    checker = material("checker", (1, 1, 1))
+    tree = checker.node_tree
+    coordinate, texture, gamma = (tree.nodes.new(f"ShaderNode{name}") for name in ("TexCoord", "TexChecker", "Gamma"))
+    texture.inputs["Color1"].default_value, texture.inputs["Color2"].default_value = (0.4, 0.1, 0.2, 1), (0.1, 0.6, 0.2, 1)
+    texture.inputs["Scale"].default_value = 0.01
+    tree.links.new(coordinate.outputs["Object"], texture.inputs["Vector"])
+    tree.links.new(texture.outputs["Color"], gamma.inputs["Color"])
+    tree.links.new(gamma.outputs[0], next(node for node in tree.nodes if node.type == "BSDF_DIFFUSE").inputs["Color"])
+    red, mesh = material("red", (0.7, 0.1, 0.1)), cube_mesh()
+    for entry in (checker, red):
+        mesh.materials.append(entry)
+    mesh.polygons.foreach_set("material_index", [0, 0, 0, 1, 1, 1])
+    for x in (0, 5):
+        link(f"cube {x}", mesh, Matrix.Translation((x, 0, 0)))
+    scene = extract_scene()
+    assert len(scene.meshes) == 1 and len(scene.instances) == 2
+    by_name = {entry.name: (index, entry) for index, entry in enumerate(scene.materials)}
+    assert by_name["checker"][1].extraction == "cycles-bake" and by_name["red"][1].extraction == "nodes"
+    assert any("checker" in note for note in scene.notes)
+    geometry = flatten(scene)
+    primitives = np.flatnonzero(geometry.material == by_name["checker"][0]).astype(np.int32)
+    assert len(primitives) == 12
+    centre = np.full(len(primitives), 1 / 3, np.float32)
+    albedo = Surfaces(scene, geometry).albedo(primitives, centre, centre)
+    distance = np.abs(albedo[:, None] - np.array([(0.4, 0.1, 0.2), (0.1, 0.6, 0.2)])).max(axis=2).min(axis=1)
+    assert distance.max() < 0.01
+    assert len(bpy.data.meshes) == 1 and len(bpy.data.objects) == 2
 
 
 def test_cameras_come_active_first_at_render_resolution(empty_blend):

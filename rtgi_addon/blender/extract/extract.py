@@ -17,7 +17,8 @@ def extract_scene(depsgraph=None, *, context=None, volumes: list[str] | None = N
 
     Without a ``depsgraph`` the scene is evaluated exactly as for F12: render subdivision levels, modifiers enabled for render,
     objects and collections visible in render. With one, that graph is read as it is: inside a RenderEngine it is its own;
-    the viewport's has the viewport's levels, modifiers and visibility, less what is hidden from render.
+    the viewport's has the viewport's levels, modifiers and visibility, less objects hidden from render. While Blender renders,
+    worlds and materials that take a Cycles render of their own raise BakeError.
 
     Lengths stay in Blender units. The scene's unit scale only changes the numbers that Blender's interface shows: Cycles measures
     the distance to a lamp in Blender units whatever it is, and so does the bake.
@@ -46,13 +47,16 @@ class _Reading:
         self._scene, self._volume_names, self._progress = scene, volume_names, progress
         self._notes: list[str] = []
         self._lights, self._volumes, self._cameras = [], [], []
+        self._world = scene.world
         self._geometry = self._materials = None
 
     def read(self, depsgraph) -> None:
         """Phase one: everything that lives only as long as the dependency graph."""
         self._materials = MaterialReader(self._scene, depsgraph)
-        override = depsgraph.view_layer_eval.material_override
-        self._geometry = GeometryCollector(self._materials, override)
+        layer = depsgraph.view_layer_eval
+        self._geometry = GeometryCollector(self._materials, layer.material_override)
+        if layer.world_override is not None:
+            self._world = layer.world_override.original
         active = depsgraph.scene.camera
         if active is not None and not active.original.hide_render:
             self._add_camera(active, depsgraph)
@@ -79,7 +83,7 @@ class _Reading:
         """Phase two: bakes and renders that materials and world need, then the frozen scene."""
         with self._materials:
             meshes, instances, materials = self._geometry.finish(self._progress)
-        world = read_world(self._scene.world, self._notes)
+        world = read_world(self._world, self._notes)
         volumes = select_volumes(self._volumes, self._volume_names)
         if not volumes:
             volumes = [fit_volume(meshes, instances, self._scene.name)]

@@ -95,6 +95,8 @@ class GeometryCollector:
     def _read(self, obj, key, matrix_world) -> _Geometry | None:
         """Read a mesh met for the first time, or met with new materials: then its arrays are shared, and only attributes that
         the new materials ask for are read. None if it has no faces."""
+        if any(system.settings.type == "HAIR" and system.settings.render_type == "PATH" for system in obj.particle_systems):
+            self._note(obj.name, "has particle hair: it has no surface to bake and is left out")
         if not len(obj.data.polygons):
             return None
         base = self._bases.get(key)

@@ -7,6 +7,8 @@ import addon_utils
 import bpy
 import numpy as np
 
+from ...errors import BakeError
+
 # What a diffuse bounce ray reports through the Light Path node; worlds often show the camera something else.
 _DIFFUSE_RAY = {"Is Diffuse Ray": 1.0, "Is Reflection Ray": 1.0, "Ray Length": 1e5, "Ray Depth": 1.0, "Diffuse Depth": 1.0}
 _SAMPLES = 4
@@ -18,7 +20,8 @@ def render_panorama(world, width: int = 1024) -> np.ndarray:
     """Radiance (width/2, width, 3) float32 of ``world`` in ``scene.World.equirect``'s layout.
 
     Each texel averages its own square of directions: four samples first, thousands around texels far brighter than the rest, so
-    that a sun disc two texels wide keeps its energy to about 0.1 %. Everything made for it is removed again.
+    that a sun disc two texels wide keeps its energy to about 0.1 %. Everything made for it is removed again. Raises
+    BakeError where Cycles cannot render.
     """
     with tempfile.TemporaryDirectory(prefix="rtgi-world-") as folder:
         made = []
@@ -47,6 +50,9 @@ def render_panorama(world, width: int = 1024) -> np.ndarray:
                 scene.render.border_min_x, scene.render.border_max_x = columns.start / width, columns.stop / width
                 texels = (rows.stop - rows.start) * (columns.stop - columns.start)
                 equirect[box] = _render(scene, int(np.clip(_BRIGHT_SAMPLES // texels, _SAMPLES, 8192)))[box]
+        except RuntimeError as error:
+            raise BakeError(f"Cycles cannot render world {world.name!r} ({str(error).strip()})",
+                            "let a running render finish, check that Cycles is installed, then bake again") from error
         finally:
             for collection, datablock in made:
                 collection.remove(datablock)

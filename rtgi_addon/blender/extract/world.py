@@ -17,7 +17,8 @@ def read_world(world, notes: list[str]) -> World:
     a Mapping that only rotates Generated coordinates, is the image's own pixels under a rotation; everything else (sky textures,
     mirror balls, gradients, mixes, groups) is a Cycles panorama of 1,024 × 512 texels.
     """
-    if world is None or not world.cycles_visibility.diffuse:
+    # Cycles' settings are there only while its add-on is on.
+    if world is None or not getattr(getattr(world, "cycles_visibility", None), "diffuse", True):
         return World.constant(0.0)
     if world.node_tree is None or (bpy.app.version < (5, 0, 0) and not world.use_nodes):
         return World.constant(np.array(world.color))
