@@ -5,28 +5,13 @@ import pytest
 
 bpy = pytest.importorskip("bpy", reason="needs Blender or its Python module")
 
+from blend_builders import cube_mesh, link, material  # noqa: E402
 from mathutils import Euler, Matrix  # noqa: E402
 
 from rtgi_addon.blender.extract import extract_scene  # noqa: E402
 from rtgi_addon.blender.extract.meshes import MeshReader  # noqa: E402
-from rtgi_addon.errors import UsageError  # noqa: E402
 from rtgi_addon.transport.geometry import flatten  # noqa: E402
 from rtgi_addon.transport.surfaces import Surfaces  # noqa: E402
-
-
-def link(name, data, matrix=None, collection=None):
-    obj = bpy.data.objects.new(name, data)
-    if matrix is not None:
-        obj.matrix_world = matrix
-    (collection or bpy.context.scene.collection).objects.link(obj)
-    return obj
-
-
-def cube_mesh(name="cube", size=1.0):
-    mesh = bpy.data.meshes.new(name)
-    corners = [(x, y, z) for x in (-size, size) for y in (-size, size) for z in (-size, size)]
-    mesh.from_pydata(corners, [], [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)])
-    return mesh
 
 
 def triangles_world(scene, instance):
@@ -42,18 +27,6 @@ def area(scene, instance):
 
 def named(scene, name):
     return [instance for instance in scene.instances if instance.name == name]
-
-
-def material(name, color):
-    made = bpy.data.materials.new(name)
-    if made.node_tree is None:
-        made.use_nodes = True
-    tree = made.node_tree
-    tree.nodes.clear()
-    diffuse, output = tree.nodes.new("ShaderNodeBsdfDiffuse"), tree.nodes.new("ShaderNodeOutputMaterial")
-    diffuse.inputs["Color"].default_value = (*color, 1.0)
-    tree.links.new(diffuse.outputs[0], output.inputs["Surface"])
-    return made
 
 
 def test_mirrored_and_sheared_instances_keep_their_matrix(empty_blend):
@@ -345,62 +318,3 @@ def test_a_material_that_takes_cycles_is_baked_once_for_all_instances(empty_blen
     distance = np.abs(albedo[:, None] - np.array([(0.4, 0.1, 0.2), (0.1, 0.6, 0.2)])).max(axis=2).min(axis=1)
     assert distance.max() < 0.01
     assert len(bpy.data.meshes) == 1 and len(bpy.data.objects) == 2
-
-
-def test_cameras_come_active_first_at_render_resolution(empty_blend):
-    link("cube", cube_mesh())
-    first = link("first", bpy.data.cameras.new("first"), Matrix.Translation((0, 0, 5)))
-    second = link("second", bpy.data.cameras.new("second"), Matrix.Diagonal((2, 2, 2, 1)))
-    second.data.type, second.data.shift_x, second.data.ortho_scale = "ORTHO", 0.25, 3.0
-    link("hidden", bpy.data.cameras.new("hidden")).hide_render = True
-    link("dome", bpy.data.cameras.new("dome")).data.type = "PANO"
-    scene = bpy.context.scene
-    scene.camera = second
-    scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 400, 300, 50
-    extracted = extract_scene()
-    assert [camera.name for camera in extracted.cameras] == ["second", "first"]
-    assert all(camera.resolution == (200, 150) for camera in extracted.cameras)
-    assert any("dome" in note for note in extracted.notes)
-    for camera, obj in zip(extracted.cameras, (second, first), strict=True):
-        expected = obj.calc_matrix_camera(bpy.context.evaluated_depsgraph_get(), x=200, y=150)
-        np.testing.assert_allclose(camera.clip_from_camera, np.array(expected), atol=1e-6)
-        np.testing.assert_allclose(camera.world_from_camera[:3, :3], np.eye(3), atol=1e-6)
-    assert scene.camera == second
-
-
-def test_extraction_leaves_no_trace_and_needs_no_camera(empty_blend):
-    link("cube", cube_mesh())
-    scene = bpy.context.scene
-    kinds = ("scenes", "objects", "meshes", "cameras", "collections", "materials", "lights", "worlds")
-
-    def state():
-        names = {kind: sorted(item.name for item in getattr(bpy.data, kind)) for kind in kinds}
-        return names, scene.camera, scene.render.engine, scene.render.resolution_x, bpy.context.scene, bpy.context.view_layer.name
-
-    before = state()
-    extracted = extract_scene()
-    assert state() == before and extracted.cameras == ()
-    assert not hasattr(bpy.types, "RTGI_EXTRACT")
-
-
-def test_what_goes_wrong_inside_reaches_the_caller(empty_blend):
-    link("cube", cube_mesh())
-    with pytest.raises(UsageError, match="nowhere"):
-        extract_scene(volumes=["nowhere"])
-    assert [scene.name for scene in bpy.data.scenes] == [bpy.context.scene.name]
-
-
-def test_a_given_depsgraph_is_read_as_it_is(empty_blend):
-    obj = link("cube", cube_mesh())
-    modifier = obj.modifiers.new("subdivision", "SUBSURF")
-    modifier.levels, modifier.render_levels = 1, 3
-    link("hidden", cube_mesh()).hide_render = True
-    scene = extract_scene(bpy.context.evaluated_depsgraph_get())
-    assert [(i.name, len(scene.meshes[i.mesh].triangles)) for i in scene.instances] == [("cube", 48)]
-
-
-def test_arrays_outlive_the_file(empty_blend):
-    link("cube", cube_mesh())
-    scene = extract_scene()
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    assert area(scene, *scene.instances) == pytest.approx(24.0)
