@@ -55,6 +55,23 @@ class BrightSurfaces:
         position = np.minimum(np.searchsorted(unique, slots), len(unique) - 1)
         self.pdf_area[:-1] = np.where(unique[position] == slots, density[position], 0)
 
+    def state(self) -> dict[str, np.ndarray]:
+        """Everything in it, for a checkpoint."""
+        pool = {} if self.count == 0 else {"points": self._points, "normals": self._normals, "radiance": self._radiance,
+                                           "density": self._density}
+        return {"pdf_area": self.pdf_area, **pool}
+
+    @classmethod
+    def restored(cls, context: LightContext, arrays: dict[str, np.ndarray]) -> "BrightSurfaces":
+        """One made from ``state``."""
+        self = object.__new__(cls)
+        self._context, self.pdf_area = context, arrays["pdf_area"]
+        self.count = len(arrays.get("points", ()))
+        if self.count:
+            self._points, self._normals = arrays["points"], arrays["normals"]
+            self._radiance, self._density = arrays["radiance"], arrays["density"]
+        return self
+
     def connect(self, numbers: np.ndarray, points: np.ndarray, faces: np.ndarray | None):
         """Join ``points`` (n, 3) to pool points picked by ``numbers`` (n,) in [0, 1).
 

@@ -232,16 +232,41 @@ class SurfaceCache:
                 setattr(other, name, np.concatenate([*rows, np.zeros((1, rows[0].shape[1]), rows[0].dtype)]))
         return other
 
-    def solve(self, bounces: int | None, tolerance: float, progress: Progress) -> None:
+    def state(self) -> dict[str, np.ndarray]:
+        """Everything that was measured, for a checkpoint."""
+        arrays = {f"table.{name}": value for name, value in self.table.state().items()}
+        if self.bright is not None:
+            arrays |= {f"bright.{name}": value for name, value in self.bright.state().items()}
+        arrays |= {name: getattr(self, name) for name in (*_ROWS, "irradiance_rest")}
+        widths = np.array([block.shape[1] for block in self.form_factors], np.int64)
+        empty = np.zeros((self.rays, 0), np.int32)
+        return arrays | {"first_bounce": self._first_bounce, "solved": np.array(self._solved), "widths": widths,
+                         "form_factors": np.concatenate([empty, *self.form_factors], axis=1),
+                         "ray_density": np.concatenate([empty.astype(np.float32), *self._ray_density], axis=1)}
+
+    def restore(self, arrays: dict[str, np.ndarray]) -> None:
+        """Take up from ``state``."""
+        self.table.restore({name.removeprefix("table."): value for name, value in arrays.items() if name.startswith("table.")})
+        bright = {name.removeprefix("bright."): value for name, value in arrays.items() if name.startswith("bright.")}
+        self.bright = BrightSurfaces.restored(self.context, bright) if bright else None
+        for name in (*_ROWS, "irradiance_rest"):
+            setattr(self, name, arrays[name])
+        self._first_bounce, self._solved = arrays["first_bounce"], int(arrays["solved"])
+        ends = np.cumsum(arrays["widths"])[:-1]
+        self.form_factors = np.split(arrays["form_factors"], ends, axis=1) if len(arrays["widths"]) else []
+        self._ray_density = np.split(arrays["ray_density"], ends, axis=1) if len(arrays["widths"]) else []
+
+    def solve(self, bounces: int | None, tolerance: float, progress: Progress, bright: bool = True) -> None:
         """Spread light between texels: ``bounces`` reflections in all (None: until the change is below ``tolerance``).
 
-        A probe's own look at a surface is one reflection, so ``bounces`` − 1 of them happen here.
+        A probe's own look at a surface is one reflection, so ``bounces`` − 1 of them happen here. ``bright`` False leaves brightly
+        lit surfaces to the rays that hit them, which costs no further ray and gives more noise.
         """
         if self._solved == self.count:
             return
         if self.bright is None:
-            self.bright = BrightSurfaces(self.context, self.layout, self.table.slots, self._reflected()[:-1], self._light.radiance_at,
-                                         self._seed)
+            slots, radiance = (self.table.slots, self._reflected()[:-1]) if bright else (self.table.slots[:0], self._reflected()[:0])
+            self.bright = BrightSurfaces(self.context, self.layout, slots, radiance, self._light.radiance_at, self._seed)
             self._first_bounce = np.zeros((1, 3), np.float32)
         missing = self.count + 1 - len(self.bright.pdf_area)
         if missing:

@@ -41,8 +41,8 @@ class SurfaceHits:
 
 
 class TexelTable:
-    """Grows by ``resolve``; rows are never moved. ``slots`` (n,) int32, ``seeds`` their SurfaceHits, ``mixed`` (n,) bool: the slot
-    is obstructed; ``accepted`` (n, points) bool: which of the slot's sample points ``sample_points`` gives see the seed.
+    """Grows by ``resolve``; rows are never moved. ``slots`` (n,) int32, ``seeds`` their SurfaceHits, ``mixed`` (n,) bool: the
+    slot is obstructed; ``accepted`` (n, points) bool: which of the slot's sample points see the seed.
 
     ``sample_numbers(slots)`` returns (points, n, 2) numbers in [0, 1), the same ones whenever it is asked.
     """
@@ -66,6 +66,18 @@ class TexelTable:
         """Slot (n,) of each texel."""
         return self.seeds.slots
 
+    def state(self) -> dict[str, np.ndarray]:
+        """Everything in it, for a checkpoint."""
+        return {"primitive": self.seeds.primitive, "u": self.seeds.u, "v": self.seeds.v, "slots": self.seeds.slots,
+                "next": self._next, "mixed": self.mixed, "accepted": self.accepted}
+
+    def restore(self, arrays: dict[str, np.ndarray]) -> None:
+        """Take up from ``state``."""
+        self.seeds = SurfaceHits(*(arrays[name] for name in ("primitive", "u", "v", "slots")))
+        self._next, self.mixed, self.accepted = arrays["next"], arrays["mixed"], arrays["accepted"]
+        # Of the texels of one slot the first made stays.
+        self._first[self.slots[::-1]] = np.arange(self.count, dtype=np.int32)[::-1]
+
     def resolve(self, parts: list[SurfaceHits]) -> list[np.ndarray]:
         """The texel (n,) int32 of each hit of each part, making texels that do not exist yet.
 
@@ -77,7 +89,7 @@ class TexelTable:
             self._create(SurfaceHits.join([part.take(rows) for part, rows in zip(parts, fresh, strict=True)]), None)
         texels = [self._first[part.slots] for part in parts]
         open_rows = [np.flatnonzero(self.mixed[texel]) for texel in texels]
-        for part_number in range(1, MAX_PARTS):
+        for _ in range(1, MAX_PARTS):
             blocked = parallel_for(lambda i: self._blocked(parts[i].take(open_rows[i]), texels[i][open_rows[i]]),  # noqa: B023
                                    len(parts), threads)
             open_rows = [rows[hidden] for rows, hidden in zip(open_rows, blocked, strict=True)]

@@ -8,15 +8,19 @@ What it is not: a lattice knows nothing of what happens between its points; see 
 weights make of that. Glossy reflection is treated as diffuse of the same albedo.
 """
 
+from dataclasses import asdict, fields, replace
+
 import numpy as np
 
 from ...errors import BakeError
 from ...progress import Progress
-from ...scene import Scene
+from ...scene import ProbeVolume, Scene
+from ...transport.context import LightContext
 from ..base import Checkpoint, Field, Technique, validate_settings
 from .bake import ProbeBake
 from .dilation import dilate
 from .field import ProbeField
+from .relight import relight
 from .settings import ProbeSettings
 
 
@@ -35,11 +39,44 @@ class Probes(Technique):
         if not scene.volumes:
             raise BakeError("the scene has no probe volume", "add a Light Probe Volume")
         seed = int(rng.integers(1 << 32))
-        bake = ProbeBake(scene, settings, seed, progress, threads, checkpoint or Checkpoint())
-        bake.run()
+        progress.stage("ray tracer")
+        progress.step(0.0, "building the ray tracer")
+        context = LightContext(scene, threads)
+        bakes, start, probes = [], 0, sum(int(np.prod(volume.resolution)) for volume in scene.volumes)
+        for number, (own, volumes) in enumerate(_by_settings(scene.volumes, settings)):
+            count = sum(int(np.prod(volume.resolution)) for volume in volumes)
+            span = progress.span(start / probes, (start + count) / probes)
+            bake = ProbeBake(context, volumes, own, seed, span, checkpoint or Checkpoint(), f"probes-{number}")
+            bake.run()
+            bakes.append(bake)
+            start += count
         progress.stage("field")
-        grids = tuple(dilate(grid) for grid in bake.grids())
-        return ProbeField(grids)
+        return _field(scene, settings, bakes, [bake.grids() for bake in bakes])
+
+
+def _by_settings(volumes: tuple[ProbeVolume, ...], settings: ProbeSettings):
+    """Volumes grouped by their settings, where a volume's own overrides replace the bake's."""
+    groups: dict[ProbeSettings, list[ProbeVolume]] = {}
+    for volume in volumes:
+        known = {item.name for item in fields(settings)}
+        own = replace(settings, **{name: value for name, value in volume.settings.items() if name in known})
+        validate_settings(own)
+        groups.setdefault(own, []).append(volume)
+    return [(own, tuple(members)) for own, members in groups.items()]
+
+
+def _field(scene: Scene, settings: ProbeSettings, bakes: list[ProbeBake], grids) -> ProbeField:
+    """The field of all bakes, in the order of the scene's volumes, with what it takes to relight it."""
+    by_name = {grid.volume.name: dilate(grid) for group in grids for grid in group}
+
+    def relit(other: Scene, progress: Progress) -> ProbeField:
+        return _field(other, settings, bakes, [relight(bake, other, progress) for bake in bakes])
+
+    stats = {"rays": int(sum(bake.ray_count + bake.cache.count * bake.cache.rays for bake in bakes)),
+             "probe_rays": int(sum(bake.ray_count for bake in bakes)), "texels": int(sum(bake.cache.count for bake in bakes)),
+             "texel_size": float(min(bake.cache.layout.size for bake in bakes))}
+    return ProbeField(tuple(by_name[volume.name] for volume in scene.volumes), includes_direct=settings.direct,
+                      params=asdict(settings), stats=stats, relit=relit)
 
 
 TECHNIQUE = Probes()

@@ -1,88 +1,85 @@
-"""How many rays each probe needs: errors measured from halves of its own sequence, extrapolated along the scene's own slope.
+"""How many rays each probe needs, from how far two independent parts of its own sequence disagree.
 
-Each doubling gives two estimates from as many rays, the first half of an Owen-scrambled Sobol sequence and the second; their
-difference measures the error of a half. The error of the whole is smaller by more than √2, since the points stratify: by how much
-is read off the differences of two successive doublings, over all probes.
+An Owen-scrambled Sobol sequence errs like c·N^−slope. The estimates from its first N₁ and its next N₂ points are nearly independent,
+so their mean square difference is c²(N₁^−2s + N₂^−2s): that gives c, and with it the error of all N₁ + N₂ points and the number
+that a smaller error takes. The slope is the literature's (−.77 to −.81 measured on probes, PHYSICS.md §5), taken with caution.
 """
 
 import numpy as np
 
 FIRST_ROUND = 256
-# Errors fall like N^−slope: −½ for independent samples, −1 for a smooth integrand.
-SLOPE_RANGE = (0.5, 1.0)
-# A probe dimmer than this share of the volume's RMS is held to the error of one that bright.
-DIM = 0.25
-# The estimate of one probe is one sample of its error: lean on the mean of its neighbours by this share.
+SLOPE = 0.7
+# One probe's difference is one sample of its error: lean on the mean of its neighbours by this share.
 POOLED = 0.5
 # Share of the target left to the sampling of probe rays; the rest is for the surface cache.
-SAMPLING_SHARE = 0.8
+SAMPLING_SHARE = 0.95
+# A round goes this share of the way that the last estimate asks for, so that an overestimate is noticed before it is paid for.
+STRIDE = 0.7
 
 
 class ErrorModel:
-    """Keeps the sums of each probe's halves and says what error the whole has.
+    """Keeps the sums of each probe's rays and says what error they have.
 
-    ``total`` and ``first_half`` (p, k, 3) float64 sums of 4π·L·Y over all rays, and over the first half of them; ``rays`` (p,)
-    int64. ``slope`` is the last measured exponent.
+    ``total`` (p, k, 3) float64 sums of 4π·L·Y over all ``rays`` (p,) int64.
     """
 
     def __init__(self, probes: int, coefficients: int):
         self.total = np.zeros((probes, coefficients, 3))
-        self.first_half = np.zeros((probes, coefficients, 3))
         self.rays = np.zeros(probes, np.int64)
-        self.slope = SLOPE_RANGE[0]
-        self._coarse = None
+        self._constant = np.full(probes, np.nan)
 
     def coefficients(self) -> np.ndarray:
         """SH estimate (p, k, 3) from all rays so far; zero where none were traced."""
         return self.total / np.maximum(self.rays, 1)[:, None, None]
 
-    def add_first(self, probes: np.ndarray, quarters: np.ndarray, rays: int) -> None:
-        """Record the first round: sums of its four quarters (4, m, k, 3), ``rays`` in all."""
-        halves = quarters[0] + quarters[1], quarters[2] + quarters[3]
-        self.total[probes], self.first_half[probes] = halves[0] + halves[1], halves[0]
-        self.rays[probes] = rays
+    def add(self, probes: np.ndarray, sums: np.ndarray, rays: np.ndarray) -> None:
+        """Add the ``sums`` (m, k, 3) of ``rays`` (m,) further rays of ``probes`` (m,), and compare them with those before."""
+        before = self.rays[probes]
+        compared = np.flatnonzero(before > 0)
+        if compared.size:
+            rows, n1, n2 = probes[compared], before[compared].astype(float), rays[compared].astype(float)
+            difference = self.total[rows] / n1[:, None, None] - sums[compared] / n2[:, None, None]
+            spread = n1 ** (-2 * SLOPE) + n2 ** (-2 * SLOPE)
+            self._constant[rows] = np.sqrt((difference**2).sum(axis=(1, 2)) / spread)
+        self.total[probes] += sums
+        self.rays[probes] += rays
 
-    def measure_first(self, probes: np.ndarray, quarter_difference: np.ndarray) -> None:
-        """Set the slope from the first round: ``quarter_difference`` (m,) mean square difference between quarters' estimates."""
-        self._set_slope(quarter_difference.sum(), (self._half_difference(probes) ** 2).sum())
+    def state(self) -> dict[str, np.ndarray]:
+        """Everything it knows, for a checkpoint."""
+        return {"total": self.total, "rays": self.rays, "constant": self._constant}
 
-    def add_doubling(self, probes: np.ndarray, second_half: np.ndarray) -> None:
-        """Record as many further rays as ``probes`` had before: sums (m, k, 3)."""
-        self.first_half[probes] = self.total[probes]
-        self.total[probes] += second_half
-        self.rays[probes] *= 2
-
-    def measure_doubling(self, probes: np.ndarray, difference_before: np.ndarray) -> None:
-        """Update the slope from probes whose differences were ``difference_before`` (m,) one doubling ago."""
-        if len(probes) >= 8:
-            self._set_slope((difference_before**2).sum(), (self._half_difference(probes) ** 2).sum())
-
-    def half_difference(self, probes: np.ndarray) -> np.ndarray:
-        """RMS difference (m,) between the estimates of the two halves, over √2: the error of a half."""
-        return self._half_difference(probes)
-
-    def _half_difference(self, probes):
-        half = (self.rays[probes] / 2)[:, None, None]
-        second = (self.total[probes] - self.first_half[probes]) / half
-        difference = self.first_half[probes] / half - second
-        return np.sqrt((difference**2).sum(axis=(1, 2)) / 2.0)
-
-    def _set_slope(self, before: float, after: float) -> None:
-        if before > 0 and after > 0:
-            self.slope = float(np.clip(0.5 * np.log2(before / after), *SLOPE_RANGE))
+    def restore(self, arrays: dict[str, np.ndarray]) -> None:
+        """Take up from ``state``."""
+        self.total, self.rays, self._constant = arrays["total"], arrays["rays"], arrays["constant"]
 
     def error(self, probes: np.ndarray, groups: np.ndarray) -> np.ndarray:
-        """Estimated norm (m,) of each probe's error, pooled with the other ``probes`` of its group (m,) int."""
-        own = self._half_difference(probes) * 2.0**-self.slope
-        relative = own / np.maximum(self.scale(probes), 1e-30)
-        count = np.bincount(groups)
-        pooled = np.sqrt(np.bincount(groups, relative**2) / np.maximum(count, 1))[groups]
-        mixed = np.sqrt((1.0 - POOLED) * relative**2 + POOLED * pooled**2)
-        return mixed * self.scale(probes)
+        """Estimated norm (m,) of each probe's error, pooled over the probes of its group (m,) int, relative to their scale."""
+        return self._relative(probes, groups) * self.scale(probes) * self.rays[probes] ** -SLOPE
+
+    def rays_needed(self, probes: np.ndarray, groups: np.ndarray, target: float) -> np.ndarray:
+        """Number of rays (m,) at which each probe's error is expected to fall to ``target`` times its scale."""
+        return (self._relative(probes, groups) / target) ** (1.0 / SLOPE)
 
     def scale(self, probes: np.ndarray) -> np.ndarray:
-        """What a relative error is relative to (m,): the probe's own norm, but no less than DIM of the RMS over all probes."""
+        """What a relative error is relative to (m,): the probe's own norm, or for dim probes its geometric mean with the RMS of
+        all, since a few per cent of a dark corner are less seen than one of a bright wall."""
         norms = np.sqrt((self.coefficients() ** 2).sum(axis=(1, 2)))
         traced = self.rays > 0
         rms = np.sqrt((norms[traced] ** 2).mean()) if traced.any() else 0.0
-        return np.maximum(norms[probes], DIM * rms)
+        return np.sqrt(norms[probes] * np.maximum(norms[probes], rms))
+
+    def _relative(self, probes, groups):
+        scale = self.scale(probes)
+        own = np.where(scale > 0, self._constant[probes] / np.where(scale > 0, scale, 1.0), 0.0)
+        count = np.maximum(np.bincount(groups), 1)
+        pooled = (np.bincount(groups, own**2) / count)[groups]
+        return np.sqrt((1.0 - POOLED) * own**2 + POOLED * pooled)
+
+
+def ladder(rays: np.ndarray, highest: int) -> np.ndarray:
+    """The least number of rays not below ``rays`` (m,) among FIRST_ROUND·2^k and 1.5 times those, at most ``highest``: few enough
+    different numbers that neighbouring probes can share their work."""
+    octave = np.floor(np.log2(np.maximum(rays, FIRST_ROUND) / FIRST_ROUND))
+    base = FIRST_ROUND * 2.0**octave
+    rung = np.where(rays <= base, base, np.where(rays <= 1.5 * base, 1.5 * base, 2.0 * base))
+    return np.minimum(rung, highest).astype(np.int64)

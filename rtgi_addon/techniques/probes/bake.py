@@ -1,20 +1,23 @@
 """The bake: place probes, trace in rounds, grow the surface cache with what the rays meet, stop each probe when it is good enough."""
 
+import time
+
 import numpy as np
 
 from ...errors import BakeError
 from ...numerics import sh
 from ...numerics.grid import cell_size
 from ...progress import Progress
-from ...scene import ProbeVolume, Scene
+from ...scene import ProbeVolume
 from ...transport.context import LightContext
 from ...transport.parallel import parallel_for
 from ...transport.surface_cache import SurfaceCache
 from ...transport.texels import Focus, TexelLayout
 from ..base import Checkpoint, ProbeGrid
-from .adaptive import FIRST_ROUND, SAMPLING_SHARE, ErrorModel
+from .adaptive import FIRST_ROUND, SAMPLING_SHARE, STRIDE, ErrorModel, ladder
 from .gather import GROUP, RAYS_PER_LIGHT_SAMPLE, Gatherer, Item
 from .placement import Placement, place
+from .relight import HitMemory
 from .settings import ProbeSettings
 
 # Rays of one work item, and of all the items that are held in memory between tracing and shading.
@@ -25,34 +28,39 @@ CACHE_RAYS = 64
 
 
 class ProbeBake:
-    """One bake of all volumes of a scene, from rays to grids."""
+    """One bake of the volumes of ``scene`` with one set of settings, from rays to grids.
 
-    def __init__(self, scene: Scene, settings: ProbeSettings, seed: int, progress: Progress, threads: int | None,
-                 checkpoint: Checkpoint):
-        self.scene, self.settings, self.seed = scene, settings, seed
-        self._progress, self._checkpoint = progress, checkpoint
-        progress.stage("ray tracer")
-        progress.step(0.0, "building the ray tracer")
-        self.context = LightContext(scene, threads)
+    Rounds follow one another until ``_plan`` wants no more rays; within a round, batches of items. Between batches the whole
+    state is in arrays, and goes to ``checkpoint`` when that is due.
+    """
+
+    def __init__(self, context: LightContext, volumes: tuple[ProbeVolume, ...], settings: ProbeSettings, seed: int,
+                 progress: Progress, checkpoint: Checkpoint, name: str):
+        self.context, self.volumes, self.settings = context, volumes, settings
+        self._progress, self._checkpoint, self._name = progress, checkpoint, name
         progress.stage("placement")
-        self.placement: Placement = place(self.context, scene.volumes, settings.virtual_offset, progress.span(0.01, 0.03))
+        self.placement: Placement = place(context, volumes, settings.virtual_offset, progress.span(0.0, 0.02))
         self._check_placement()
         refine = settings.target / 0.01
-        size = settings.texel_size or texel_size(self.context, scene.volumes, TEXELS / refine)
-        layout = TexelLayout(self.context.geometry, Focus(*focus(scene.volumes), size))
+        size = settings.texel_size or texel_size(context, volumes, TEXELS / refine)
+        layout = TexelLayout(context.geometry, Focus(*focus(volumes), size))
         rays = settings.cache_rays or int(np.clip(CACHE_RAYS * 2 ** round(np.log2(1.0 / refine)), 16, 1024))
-        self.cache = SurfaceCache(self.context, layout, seed, rays)
-        self.gatherer = Gatherer(self.context, self.cache, self.placement, settings, seed)
+        self.cache = SurfaceCache(context, layout, seed, rays)
+        self.gatherer = Gatherer(context, self.cache, self.placement, settings, seed)
         count = len(self.placement.positions)
         self.model = ErrorModel(count, sh.coefficient_count(settings.order))
         side = settings.visibility_resolution
         self._distance = np.zeros((count, side * side, 2), np.float32)
         self._distance_weight = np.zeros((count, side * side), np.float32)
-        self.ray_count = 0
+        self._sums = np.zeros_like(self.model.total)
+        self.emitted = np.zeros_like(self.model.total) if context.surfaces.has_emission else None
+        self._goal: np.ndarray | None = None
+        self._round = self._next = self.ray_count = 0
+        self.memory = HitMemory()
 
     def _check_placement(self) -> None:
         start = 0
-        for volume in self.scene.volumes:
+        for volume in self.volumes:
             stop = start + int(np.prod(volume.resolution))
             if not self.placement.measured[start:stop].any():
                 raise BakeError(f"every probe of the volume {volume.name!r} lies inside geometry",
@@ -62,107 +70,141 @@ class ProbeBake:
     def run(self) -> None:
         """Trace until every probe has met its error or its number of rays. Raises Cancelled or BakeError."""
         self._progress.stage("rays")
-        progress = self._progress.span(0.03, 0.95)
-        probes = np.flatnonzero(self.placement.measured)
-        fixed = self.settings.rays
-        first = FIRST_ROUND if fixed is None else max(16, -(-fixed // 32) * 16)
-        first = min(first, self.settings.max_rays) if fixed is None else first
-        self._first_round(probes, first, progress)
-        if fixed is not None:
-            self._double(probes, progress.span(0.5, 1.0))
-            return
-        target = self.settings.error * SAMPLING_SHARE
+        state = self._checkpoint.load(self._name)
+        if state is not None:
+            self._restore(state)
         while True:
-            error = self.model.error(probes, np.unique(probes // GROUP, return_inverse=True)[1])
-            relative = error / np.maximum(self.model.scale(probes), 1e-30)
-            probes = probes[(relative > target) & (self.model.rays[probes] * 2 <= self.settings.max_rays)]
-            if probes.size == 0:
-                return
-            before = self.model.half_difference(probes)
-            self._double(probes, progress.span(0.3, 1.0))
-            self.model.measure_doubling(probes, before)
+            if self._goal is None:
+                self._goal = self._plan()
+                if self._goal is None:
+                    return
+                self._next = 0
+                self._sums[:] = 0
+            self._trace_round()
+            added = self._goal - self.model.rays
+            probes = np.flatnonzero(added)
+            self.model.add(probes, self._sums[probes], added[probes])
+            self._goal = None
+            self._round += 1
 
-    def _first_round(self, probes: np.ndarray, rays: int, progress: Progress) -> None:
-        quarter = rays // 4 // RAYS_PER_LIGHT_SAMPLE * RAYS_PER_LIGHT_SAMPLE
-        if quarter == 0:
-            bounds = [0, rays // 2, rays // 2, rays, rays]
-        else:
-            bounds = [0, quarter, 2 * quarter, 3 * quarter, rays]
-        sums = np.zeros((4, len(probes), *self.model.total.shape[1:]))
-        row = np.zeros(len(self.placement.positions), np.int64)
-        row[probes] = np.arange(len(probes))
-        items = [(part, item) for part in range(4) if bounds[part + 1] > bounds[part]
-                 for item in self._items(probes, bounds[part], bounds[part + 1])]
+    def _plan(self) -> np.ndarray | None:
+        """How many rays each probe (p,) shall have after the next round, or None when enough were traced."""
+        rays, measured, settings = self.model.rays, self.placement.measured, self.settings
+        step = 2 * RAYS_PER_LIGHT_SAMPLE
+        first = min(FIRST_ROUND, settings.max_rays) if settings.rays is None else -(-settings.rays // step) * step
+        if self._round < 2:
+            # Two halves, so that there is a difference to read the error from.
+            return np.where(measured, first // step * RAYS_PER_LIGHT_SAMPLE if self._round == 0 else first, 0)
+        if settings.rays is not None:
+            return None
+        probes = np.flatnonzero(measured)
+        needed = self.model.rays_needed(probes, self._groups(probes), settings.error * SAMPLING_SHARE)
+        wanting = (needed > rays[probes]) & (rays[probes] < settings.max_rays)
+        probes, needed = probes[wanting], needed[wanting]
+        if probes.size == 0:
+            return None
+        goal = rays.copy()
+        goal[probes] = ladder(np.maximum(STRIDE * needed, rays[probes] + 1), settings.max_rays)
+        return goal
 
-        def add(index, gathered):
-            part, item = items[index]
-            sums[part, row[item.probes]] += gathered.sh
-
-        self._run_items([item for _, item in items], add, progress.span(0.0, 0.3))
-        self.model.add_first(probes, sums, rays)
-        if quarter:
-            means = sums / np.diff(bounds)[:, None, None, None]
-            spread = ((means - means.mean(axis=0)) ** 2).sum(axis=(0, 2, 3)) / 3.0
-            self.model.measure_first(probes, spread)
-
-    def _double(self, probes: np.ndarray, progress: Progress) -> None:
-        sums = np.zeros(self.model.total.shape)
-        rays = self.model.rays[probes]
-        items = [item for count in np.unique(rays) for item in self._items(probes[rays == count], int(count), int(2 * count))]
-
-        def add(index, gathered):
-            sums[items[index].probes] += gathered.sh
-
-        self._run_items(items, add, progress)
-        self.model.add_doubling(probes, sums[probes])
+    def _expected_rays(self) -> float:
+        """Rays that the whole bake is now thought to take, for the progress bar."""
+        goal = float(self._goal.sum())
+        if self.settings.rays is not None:
+            return self.placement.measured.sum() * float(self.settings.rays)
+        if self._round < 2:
+            return 6.0 * FIRST_ROUND * self.placement.measured.sum()
+        probes = np.flatnonzero(self.placement.measured)
+        needed = self.model.rays_needed(probes, self._groups(probes), self.settings.error * SAMPLING_SHARE)
+        return max(goal, float(np.clip(needed, self._goal[probes], self.settings.max_rays).sum()))
 
     @staticmethod
-    def _items(probes: np.ndarray, first: int, last: int) -> list[Item]:
-        """Cut the rays ``first`` … ``last`` of ``probes`` into items, group by group."""
-        items = []
-        for members in np.split(probes, np.flatnonzero(np.diff(probes // GROUP)) + 1):
+    def _groups(probes: np.ndarray) -> np.ndarray:
+        return np.unique(probes // GROUP, return_inverse=True)[1].reshape(-1)
+
+    def _items(self) -> list[Item]:
+        """The rays of this round cut into items: probes of one group with the same first and last ray."""
+        items, before = [], self.model.rays
+        probes = np.flatnonzero(self._goal > before)
+        key = np.stack([probes // GROUP, before[probes], self._goal[probes]], axis=1)
+        distinct, which = np.unique(key, axis=0, return_inverse=True)
+        which = which.reshape(-1)
+        for number, (group, first, last) in enumerate(distinct.tolist()):
+            members = probes[which == number]
             step = max(RAYS_PER_LIGHT_SAMPLE, ITEM_RAYS // len(members) // RAYS_PER_LIGHT_SAMPLE * RAYS_PER_LIGHT_SAMPLE)
-            items += [Item(int(members[0]) // GROUP, members, start, min(start + step, last))
-                      for start in range(first, last, step)]
+            items += [Item(group, members, start, min(start + step, last)) for start in range(first, last, step)]
         return items
 
-    def _run_items(self, items: list[Item], add, progress: Progress) -> None:
+    def _trace_round(self) -> None:
         """Trace items, grow the cache by what they hit, shade them; in batches that bound memory. The batches depend on the
         items alone, so the result is the same for any number of threads."""
-        start = 0
-        threads = self.context.threads
-        while start < len(items):
-            stop, rays = start, 0
-            while stop < len(items) and (stop == start or rays + items[stop].ray_count <= BATCH_RAYS):
+        items, expected, started, before = self._items(), self._expected_rays(), time.monotonic(), self.ray_count
+        while self._next < len(items):
+            stop, rays = self._next, 0
+            while stop < len(items) and (stop == self._next or rays + items[stop].ray_count <= BATCH_RAYS):
                 rays += items[stop].ray_count
                 stop += 1
-            batch = items[start:stop]
-            part = progress.span(start / len(items), stop / len(items))
-            traced = parallel_for(lambda i, batch=batch: self.gatherer.trace(batch[i]), len(batch), threads,
-                                  part.span(0.0, 0.4), "probe rays")
-            texels = [None] * len(batch)
-            if self.settings.bounces != 0:
-                texels = self.cache.reach([one.surface for one in traced], part.span(0.4, 0.5))
-                self.cache.solve(self.settings.bounces, 0.01 * self.settings.target, part.span(0.5, 0.6))
-            gathered = parallel_for(lambda i, args=(batch, traced, texels): self.gatherer.shade(*(arg[i] for arg in args)),
-                                    len(batch), threads, part.span(0.6, 1.0), "light at probe rays")
-            for index, (item, one) in enumerate(zip(batch, gathered, strict=True), start=start):
-                add(index, one)
-                self._distance[item.probes] += one.distance.transpose(1, 0, 2)
-                self._distance_weight[item.probes] += one.distance_weight
+            rate = (self.ray_count - before) / max(time.monotonic() - started, 1e-3)
+            label = f"probe rays, {rate / 1e6:.1f} M/s" if rate else "probe rays"
+            self._run_batch(items[self._next:stop], label, self._progress.span(
+                0.02 + 0.95 * min(1.0, self.ray_count / expected), 0.02 + 0.95 * min(1.0, (self.ray_count + rays) / expected)))
             self.ray_count += rays
-            start = stop
+            self._next = stop
+            if self._checkpoint.due:
+                self._checkpoint.save(self._name, self._state())
+
+    def _run_batch(self, batch: list[Item], label: str, progress: Progress) -> None:
+        threads = self.context.threads
+        traced = parallel_for(lambda i: self.gatherer.trace(batch[i]), len(batch), threads, progress.span(0.0, 0.4), label)
+        texels = [None] * len(batch)
+        if self.settings.bounces != 0:
+            texels = self.cache.reach([one.surface for one in traced], progress.span(0.4, 0.5))
+            self.cache.solve(self.settings.bounces, 0.01 * self.settings.target, progress.span(0.5, 0.6))
+        gathered = parallel_for(lambda i: self.gatherer.shade(batch[i], traced[i], texels[i]), len(batch), threads,
+                                progress.span(0.6, 1.0), label)
+        for item, hits, texel, one in zip(batch, traced, texels, gathered, strict=True):
+            self._sums[item.probes] += one.sh
+            self._distance[item.probes] += one.distance.transpose(1, 0, 2)
+            self._distance_weight[item.probes] += one.distance_weight
+            self.memory.keep(item, hits, texel, one)
+            if one.emitted is not None:
+                self.emitted[item.probes] += one.emitted
+
+    def _state(self) -> dict[str, np.ndarray]:
+        arrays = {f"cache.{name}": value for name, value in self.cache.state().items()}
+        arrays |= {f"model.{name}": value for name, value in self.model.state().items()}
+        numbers = np.array([self._round, self._next, self.ray_count], np.int64)
+        return arrays | {"numbers": numbers, "goal": self._goal, "sums": self._sums, "distance": self._distance,
+                         "distance_weight": self._distance_weight}
+
+    def _restore(self, arrays: dict[str, np.ndarray]) -> None:
+        def part(prefix):
+            return {name.removeprefix(prefix): value for name, value in arrays.items() if name.startswith(prefix)}
+
+        self.cache.restore(part("cache."))
+        self.model.restore(part("model."))
+        self._round, self._next, self.ray_count = (int(number) for number in arrays["numbers"])
+        self._goal, self._sums = arrays["goal"], arrays["sums"]
+        self._distance, self._distance_weight = arrays["distance"], arrays["distance_weight"]
+        self.memory.forget()
 
     def grids(self) -> tuple[ProbeGrid, ...]:
         """The measured probes as one grid per volume; probes inside geometry hold zeros."""
-        coefficients = self.model.coefficients().astype(np.float32)
+        coefficients = self.model.coefficients()
         probes = np.flatnonzero(self.model.rays > 0)
+        if self.settings.direct and probes.size:
+            self._progress.step(0.98, "light of lamps")
+            coefficients[probes] += self.gatherer.lamps(probes)
         error = np.full(len(coefficients), np.nan, np.float32)
-        error[probes] = self.model.error(probes, np.unique(probes // GROUP, return_inverse=True)[1])
+        error[probes] = self.model.error(probes, self._groups(probes)) / np.sqrt(3.0 * coefficients.shape[1])
+        return self.cut(coefficients.astype(np.float32), error)
+
+    def cut(self, coefficients: np.ndarray, error: np.ndarray) -> tuple[ProbeGrid, ...]:
+        """Grids of the volumes from ``coefficients`` (p, k, 3) and ``error`` (p,) of all probes."""
         side = self.settings.visibility_resolution
         visibility = self._distance / np.maximum(self._distance_weight, 1e-30)[:, :, None]
         result, start = [], 0
-        for volume in self.scene.volumes:
+        for volume in self.volumes:
             shape = tuple(reversed(volume.resolution))
             span = slice(start, start + int(np.prod(shape)))
             start = span.stop

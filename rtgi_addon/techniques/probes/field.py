@@ -6,7 +6,9 @@ from functools import cached_property
 
 import numpy as np
 
-from ...scene import ProbeVolume
+from ...errors import BakeError
+from ...progress import Progress
+from ...scene import ProbeVolume, Scene
 from ..base import Field, ProbeGrid
 from .lookup import GridLookup, LookupSettings
 
@@ -24,7 +26,7 @@ class ProbeField(Field):
     technique = "probes"
 
     def __init__(self, probe_grids, *, includes_direct: bool = False, params: dict | None = None, stats: dict | None = None,
-                 lookup: LookupSettings | None = None):
+                 lookup: LookupSettings | None = None, relit=None):
         if not probe_grids:
             raise ValueError("a probe field needs at least one grid")
         self._grids = tuple(probe_grids)
@@ -32,10 +34,22 @@ class ProbeField(Field):
         self.lookup = lookup or LookupSettings()
         self.params = {**(params or {}), "lookup": asdict(self.lookup)}
         self.stats = dict(stats or {})
+        self._relit = relit
+
+    def relight(self, scene: Scene, progress: Progress | None = None) -> "ProbeField":
+        """This field under the lamps and world of ``scene``, from the hits of its bake: no probe or form-factor ray is traced.
+
+        Raises BakeError if geometry or materials are not those of the bake, or if the bake kept no hits (it was read from
+        files, resumed, or too large).
+        """
+        if self._relit is None:
+            raise BakeError("these probes were read from files, without the hits of their bake", "bake again to relight them")
+        return self._relit(scene, progress or Progress())
 
     def with_lookup(self, lookup: LookupSettings) -> "ProbeField":
         """The same probes, read another way."""
-        return type(self)(self._grids, includes_direct=self.includes_direct, params=self.params, stats=self.stats, lookup=lookup)
+        return type(self)(self._grids, includes_direct=self.includes_direct, params=self.params, stats=self.stats, lookup=lookup,
+                          relit=self._relit)
 
     def grids(self) -> tuple[ProbeGrid, ...]:
         """The grids as baked: neither deringed nor dilated."""

@@ -20,8 +20,11 @@ from ...transport.vectors import dot
 GROUP = 64
 # One emitter (and one bright world) sample for so many rays.
 RAYS_PER_LIGHT_SAMPLE = 8
-# Sharpness of the cosine-power filter that spreads ray distances over a visibility tile (Majercik et al. 2019).
-_VISIBILITY_SHARPNESS = 50.0
+# Samples of each lamp that has an extent, where its direct light is wanted.
+LAMP_SAMPLES = 64
+# Sharpness of the cosine-power filter that spreads ray distances over a visibility tile: Majercik et al. 2019 use 50 for
+# few rays a frame; three times that leaks half as much light past thin walls.
+_VISIBILITY_SHARPNESS = 150.0
 _UNIFORM_PDF = np.float32(1.0 / (4.0 * np.pi))
 
 
@@ -54,10 +57,13 @@ class Traced:
 
 @dataclass(eq=False)
 class Gathered:
-    """An item's sums: ``sh`` (m, k, 3) the sum over its rays of 4π·L·Y (divide by the number of rays), and for visibility the
-    weighted sums (T², m, 2) of distance and squared distance with their weights (T²,)."""
+    """An item's sums: ``sh`` (m, k, 3) the sum over its rays of 4π·L·Y (divide by the number of rays), ``emitted`` what of it is
+    light from emissive surfaces (None where nothing emits), ``albedo`` (h, 3) at the hits (None where it is each triangle's own),
+    and for visibility the weighted sums (T², m, 2) of distance and squared distance with their weights (T²,)."""
 
     sh: np.ndarray
+    emitted: np.ndarray | None
+    albedo: np.ndarray | None
     distance: np.ndarray
     distance_weight: np.ndarray
 
@@ -76,7 +82,7 @@ class Gatherer:
 
     def trace(self, item: Item) -> Traced:
         """Nearest hits of an item's rays."""
-        directions = sphere_from_square(self._numbers(item, 2))
+        directions = self.directions(item)
         m = len(item.probes)
         rays = np.repeat(directions, m, axis=0)
         origins = np.tile(self._placement.positions[item.probes], (len(directions), 1))
@@ -86,6 +92,17 @@ class Gatherer:
         front = dot(self._context.geometry.normals_world[primitive], rays[rows]) < 0
         return Traced(SurfaceHits(primitive, u, v, self._cache.layout.slots(primitive, u, v, front)), rows, hits.t[rows], directions)
 
+    def directions(self, item: Item) -> np.ndarray:
+        """Directions (n, 3) that the item's probes share."""
+        return sphere_from_square(self._numbers(item, 2))
+
+    def under(self, context: LightContext, cache: SurfaceCache) -> "Gatherer":
+        """The same probes and directions under other light."""
+        other = object.__new__(Gatherer)
+        other.__dict__.update(self.__dict__)
+        other._context, other._cache = context, cache
+        return other
+
     def _numbers(self, item: Item, last: int, first: int = 0) -> np.ndarray:
         points = sobol_owen(item.last - item.first, last, hash_u32(self._seed, item.group), start=item.first)
         return points[:, first:]
@@ -94,34 +111,49 @@ class Gatherer:
         """Radiance along the traced rays, projected. ``texel`` (h,) is the cache's for each hit, None where nothing is reflected."""
         m, n = len(item.probes), item.last - item.first
         radiance = np.zeros((n, m, 3), np.float32)
-        radiance.reshape(-1, 3)[traced.rows] = self._radiance_of_hits(item, traced, texel)
-        if not self._context.environment.is_black:
-            sky = self._context.environment.base_radiance(traced.directions)
-            missed = np.ones(n * m, bool)
-            missed[traced.rows] = False
-            radiance += np.where(missed.reshape(n, m, 1), sky[:, None, :], np.float32(0))
-        basis = sh.evaluate(traced.directions, self._order)
-        projected = _project(basis, radiance) * np.float32(4.0 * np.pi) + self._light_samples(item, texel is not None)
-        return Gathered(projected, *self._visibility(item, traced))
-
-    def _radiance_of_hits(self, item: Item, traced: Traced, texel: np.ndarray | None) -> np.ndarray:
-        geometry, surfaces, cache, hits = self._context.geometry, self._context.surfaces, self._cache, traced.surface
-        result = np.zeros((len(traced.rows), 3), np.float32)
+        albedo = None
         if texel is not None:
-            irradiance = np.take(cache.irradiance_rest, texel, axis=0, mode="wrap")
-            if cache.sources.count:
-                irradiance += self._direct(item, traced, texel)
-            albedo = surfaces.albedo(hits.primitive, hits.u, hits.v) if self._albedo is None else self._albedo[hits.primitive]
-            result = irradiance * albedo * np.float32(1.0 / np.pi)
-        if surfaces.has_emission:
-            rows = np.flatnonzero(surfaces.emissive[geometry.material[hits.primitive]])
-            found = hits.take(rows)
-            emission = surfaces.emission(found.primitive, found.u, found.v)
-            if self._sample_emitters:
-                density = self._density(item, traced, rows)
-                by_light = self._context.emitters.pdf_area(found.primitive) / RAYS_PER_LIGHT_SAMPLE
-                emission = emission * (density / np.maximum(density + by_light, 1e-30))[:, None]
-            result[rows] += emission
+            hits = traced.surface
+            albedo = self._context.surfaces.albedo(hits.primitive, hits.u, hits.v) if self._albedo is None else None
+            radiance.reshape(-1, 3)[traced.rows] = self._reflected(item, traced, texel, albedo)
+        if not self._context.environment.is_black:
+            radiance += self.sky(traced, n, m)
+        basis = sh.evaluate(traced.directions, self._order)
+        total = project(basis, radiance) * np.float32(4.0 * np.pi) + self._light_samples(item, texel is not None)
+        emitted = None
+        if self._context.surfaces.has_emission:
+            radiance[:] = 0
+            radiance.reshape(-1, 3)[traced.rows] = self._emitted(item, traced)
+            emitted = project(basis, radiance) * np.float32(4.0 * np.pi) + self._emitter_samples(item)
+            total = total + emitted
+        return Gathered(total, emitted, albedo, *self._visibility(item, traced))
+
+    def sky(self, traced: Traced, n: int, m: int) -> np.ndarray:
+        """Radiance (n, m, 3) of the world, without its bright patches, along the rays that hit nothing; 0 along the others."""
+        missed = np.ones(n * m, bool)
+        missed[traced.rows] = False
+        sky = self._context.environment.base_radiance(traced.directions)
+        return np.where(missed.reshape(n, m, 1), sky[:, None, :], np.float32(0))
+
+    def _reflected(self, item: Item, traced: Traced, texel: np.ndarray, albedo: np.ndarray | None) -> np.ndarray:
+        cache = self._cache
+        irradiance = np.take(cache.irradiance_rest, texel, axis=0, mode="wrap")
+        if cache.sources.count:
+            irradiance += self._direct(item, traced, texel)
+        irradiance *= np.take(self._albedo, traced.surface.primitive, axis=0) if albedo is None else albedo
+        irradiance *= np.float32(1.0 / np.pi)
+        return irradiance
+
+    def _emitted(self, item: Item, traced: Traced) -> np.ndarray:
+        surfaces, result = self._context.surfaces, np.zeros((len(traced.rows), 3), np.float32)
+        rows = np.flatnonzero(surfaces.emissive[self._context.geometry.material[traced.surface.primitive]])
+        found = traced.surface.take(rows)
+        emission = surfaces.emission(found.primitive, found.u, found.v)
+        if self._sample_emitters:
+            density = self._density(item, traced, rows)
+            by_light = self._context.emitters.pdf_area(found.primitive) / RAYS_PER_LIGHT_SAMPLE
+            emission = emission * (density / np.maximum(density + by_light, 1e-30))[:, None]
+        result[rows] = emission
         return result
 
     def _density(self, item: Item, traced: Traced, rows: np.ndarray) -> np.ndarray:
@@ -164,38 +196,58 @@ class Gatherer:
         numbers = self._numbers(item, last, first)[:, None] + (shift >> np.uint32(8)).astype(np.float32) * np.float32(2.0**-24)
         return (numbers - np.floor(numbers)).reshape(-1, last - first)
 
-    def _light_samples(self, item: Item, reflected: bool) -> np.ndarray | np.float32:
-        """Sums (m, k, 3), in the units of Gathered.sh, of emitters, bright surfaces and bright sky sampled from the probes."""
-        context, rays, bright_surfaces = self._context, item.last - item.first, self._cache.bright
-        n, m, k = rays // RAYS_PER_LIGHT_SAMPLE, len(item.probes), sh.coefficient_count(self._order)
-        sample_bright = reflected and bright_surfaces.count > 0
-        bright = context.environment.bright
-        if n == 0 or not (self._sample_emitters or sample_bright or bright.count):
-            return np.float32(0)
-        total = np.zeros((m, k, 3), np.float32)
-        start = item.first // RAYS_PER_LIGHT_SAMPLE
-        origins = np.tile(self._placement.positions[item.probes], (n, 1))
-        if bright.count:
-            directions, weight = bright.sample(sobol_owen(n, 2, hash_u32(self._seed, item.group, 3), start=start))
-            free = ~context.tracer.occluded(origins, np.repeat(directions, m, axis=0))
-            seen = np.where(free.reshape(n, m, 1), weight[:, None, :], np.float32(0))
-            total += _project(sh.evaluate(directions, self._order), seen) * np.float32(RAYS_PER_LIGHT_SAMPLE)
-        connections = []
-        if self._sample_emitters:
-            xi = sobol_owen(n, 3, hash_u32(self._seed, item.group, 4), start=start)
-            connections.append(self._connect_emitters(xi, origins, m))
-        if sample_bright:
+    def _light_samples(self, item: Item, reflected: bool) -> np.ndarray:
+        """Sums (m, k, 3), in the units of Gathered.sh, of bright sky and bright surfaces sampled from the probes."""
+        total, surfaces = np.zeros((len(item.probes), sh.coefficient_count(self._order), 3), np.float32), self._cache.bright
+        if self._context.environment.bright.count:
+            total += self.bright_sky(item)
+        n, m, origins, start = self._light_sample_frame(item)
+        if n and reflected and surfaces.count:
             # Each probe meets its own points of the pool, in the sequence's order.
             shift = (hash_u32(item.probes, self._seed, 5) >> np.uint32(8)).astype(np.float32) * np.float32(2.0**-24)
             numbers = sobol_owen(n, 1, hash_u32(self._seed, item.group, 5), start=start) + shift
-            connections.append(bright_surfaces.connect((numbers - np.floor(numbers)).reshape(-1), origins, None))
-        for directions, at_light, density, emission in connections:
-            # The balance heuristic over rays and samples together, with both counted per ray.
-            at_light = np.maximum(at_light, 0)
-            weight = at_light / np.maximum(_UNIFORM_PDF * at_light + density / RAYS_PER_LIGHT_SAMPLE, 1e-30)
-            basis = sh.evaluate(directions, self._order).reshape(n, m, k)
-            total += np.matmul(basis.transpose(1, 2, 0), (emission * weight[:, None]).reshape(n, m, 3).transpose(1, 0, 2))
+            total += self._balanced(surfaces.connect((numbers - np.floor(numbers)).reshape(-1), origins, None), n, m)
         return total
+
+    def bright_sky(self, item: Item) -> np.ndarray:
+        """The part of ``_light_samples`` that comes from bright patches of the world (m, k, 3)."""
+        n, m, origins, start = self._light_sample_frame(item)
+        xi = sobol_owen(n, 2, hash_u32(self._seed, item.group, 3), start=start)
+        directions, weight = self._context.environment.bright.sample(xi)
+        free = ~self._context.tracer.occluded(origins, np.repeat(directions, m, axis=0))
+        seen = np.where(free.reshape(n, m, 1), weight[:, None, :], np.float32(0))
+        return project(sh.evaluate(directions, self._order), seen) * np.float32(RAYS_PER_LIGHT_SAMPLE)
+
+    def _emitter_samples(self, item: Item) -> np.ndarray | np.float32:
+        """As ``_light_samples``, for emissive triangles."""
+        n, m, origins, start = self._light_sample_frame(item)
+        if n == 0 or not self._sample_emitters:
+            return np.float32(0)
+        xi = sobol_owen(n, 3, hash_u32(self._seed, item.group, 4), start=start)
+        return self._balanced(self._connect_emitters(xi, origins, m), n, m)
+
+    def _light_sample_frame(self, item: Item):
+        n, m = (item.last - item.first) // RAYS_PER_LIGHT_SAMPLE, len(item.probes)
+        return n, m, np.tile(self._placement.positions[item.probes], (n, 1)), item.first // RAYS_PER_LIGHT_SAMPLE
+
+    def _balanced(self, connection, n: int, m: int) -> np.ndarray:
+        """Sum (m, k, 3) of n·m connections by the balance heuristic over rays and samples together, both counted per ray."""
+        directions, at_light, density, emission = connection
+        at_light = np.maximum(at_light, 0)
+        weight = at_light / np.maximum(_UNIFORM_PDF * at_light + density / RAYS_PER_LIGHT_SAMPLE, 1e-30)
+        basis = np.ascontiguousarray(sh.evaluate(directions, self._order)).reshape(n, m, -1)
+        return np.matmul(basis.transpose(1, 2, 0), (emission * weight[:, None]).reshape(n, m, 3).transpose(1, 0, 2))
+
+    def lamps(self, probes: np.ndarray) -> np.ndarray:
+        """The direct light of lamps as SH coefficients (m, k, 3)."""
+        sources, points = self._cache.sources, self._placement.positions[probes]
+        result = np.zeros((len(probes), sh.coefficient_count(self._order), 3))
+        for lamp in range(self._context.lamps.count):
+            samples = 1 if sources.is_delta[lamp] else LAMP_SAMPLES
+            for xi in sobol_owen(samples, 2, hash_u32(self._seed, lamp, 6)):
+                directions, irradiance = sources.facing_irradiance(lamp, points, np.tile(xi, (len(points), 1)))
+                result += sh.evaluate(directions, self._order)[:, :, None] * (irradiance / np.float32(samples))[:, None, :]
+        return result
 
     def _connect_emitters(self, xi: np.ndarray, origins: np.ndarray, m: int):
         """As BrightSurfaces.connect, for emissive triangles: n samples shared by m probes."""
@@ -226,7 +278,7 @@ def _turn(numbers: np.ndarray, source: int) -> np.ndarray:
     return turned - np.floor(turned)
 
 
-def _project(basis: np.ndarray, radiance: np.ndarray) -> np.ndarray:
+def project(basis: np.ndarray, radiance: np.ndarray) -> np.ndarray:
     """Sum over directions of ``basis`` (n, k) times ``radiance`` (n, m, 3): (m, k, 3)."""
     n, m, _ = radiance.shape
     return (basis.T @ radiance.reshape(n, m * 3)).reshape(-1, m, 3).transpose(1, 0, 2)

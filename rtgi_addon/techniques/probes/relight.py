@@ -1,0 +1,101 @@
+"""Baked probes under other lamps: the rays' hits are kept, so a moved or recoloured light costs no probe or form-factor ray."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...errors import BakeError
+from ...numerics import sh
+from ...progress import Progress
+from ...scene import Scene
+from ...transport.parallel import parallel_for
+from ..base import ProbeGrid
+
+# Hits of this many rays are kept (4 bytes each, and 6 more where albedo varies within triangles).
+MAX_KEPT_RAYS = 1 << 25
+
+
+@dataclass(frozen=True, eq=False)
+class _Kept:
+    """An item's memory: the texel (n, m) of each ray, and the albedo there (n, m, 3) float16 or None where the texel's will do."""
+
+    item: object
+    texel: np.ndarray
+    albedo: np.ndarray | None
+
+
+class HitMemory:
+    """What a bake's rays hit, for as long as it stays within MAX_KEPT_RAYS; beyond, or after a resume, nothing is kept."""
+
+    def __init__(self):
+        self.items: list[_Kept] | None = []
+        self._rays = 0
+
+    def forget(self) -> None:
+        """Drop everything: this bake cannot be relit."""
+        self.items = None
+
+    def keep(self, item, traced, texel: np.ndarray | None, gathered) -> None:
+        """Remember one shaded item."""
+        self._rays += item.ray_count
+        if self.items is None or texel is None or self._rays > MAX_KEPT_RAYS:
+            self.forget()
+            return
+        n, m = item.last - item.first, len(item.probes)
+        whole = np.full(n * m, -1, np.int32)
+        whole[traced.rows] = texel
+        albedo = None
+        if gathered.albedo is not None:
+            albedo = np.zeros((n * m, 3), np.float16)
+            albedo[traced.rows] = gathered.albedo
+            albedo = albedo.reshape(n, m, 3)
+        self.items.append(_Kept(item, whole.reshape(n, m), albedo))
+
+
+def relight(bake, scene: Scene, progress: Progress) -> tuple[ProbeGrid, ...]:
+    """Grids of ``bake`` (a finished ProbeBake) under the lamps and world of ``scene``.
+
+    Direct light is taken as the mean over each texel instead of at every hit, so edges of shadows are as sharp as texels are;
+    their size followed the old lamps. Raises BakeError if geometry or materials changed, or the hits were not kept.
+    """
+    if bake.memory.items is None:
+        raise BakeError("this bake kept no hits to relight",
+                        "bake again (hits are kept for up to 33 million rays, and not by a resumed bake)")
+    context = bake.context.relit(scene)
+    cache = bake.cache.relight(context, progress.span(0.0, 0.5))
+    cache.solve(bake.settings.bounces, 0.1 * bake.settings.target, progress.span(0.5, 0.7), bright=False)
+    irradiance = cache.irradiance_rest + cache.irradiance_direct
+    # Rows of four floats: numpy copies 16-byte rows with a single instruction.
+    reflected = np.zeros((len(irradiance), 4), np.float32)
+    reflected[:, :3] = irradiance * np.float32(1.0 / np.pi)
+    by_texel = reflected.copy()
+    by_texel[:, :3] *= cache.albedo
+    gatherer = bake.gatherer.under(context, cache)
+    order = bake.settings.order
+    sums = np.zeros_like(bake.model.total)
+
+    def work(i):
+        kept = bake.memory.items[i]
+        n, m = kept.texel.shape
+        directions = gatherer.directions(kept.item)
+        radiance = np.take(reflected if kept.albedo is not None else by_texel, kept.texel, axis=0, mode="wrap")
+        if kept.albedo is not None:
+            radiance[..., :3] *= kept.albedo
+        if not context.environment.is_black:
+            sky = context.environment.base_radiance(directions)
+            radiance[..., :3] += np.where((kept.texel < 0)[:, :, None], sky[:, None, :], np.float32(0))
+        basis = sh.evaluate(directions, order)
+        projected = (basis.T @ radiance.reshape(n, m * 4)).reshape(-1, m, 4)[:, :, :3].transpose(1, 0, 2)
+        projected = projected * np.float32(4.0 * np.pi)
+        return projected + gatherer.bright_sky(kept.item) if context.environment.bright.count else projected
+
+    parts = parallel_for(work, len(bake.memory.items), context.threads, progress.span(0.7, 1.0), "relighting probes")
+    for kept, part in zip(bake.memory.items, parts, strict=True):
+        sums[kept.item.probes] += part
+    if bake.emitted is not None:
+        sums += bake.emitted
+    coefficients = sums / np.maximum(bake.model.rays, 1)[:, None, None]
+    probes = np.flatnonzero(bake.model.rays > 0)
+    if bake.settings.direct:
+        coefficients[probes] += gatherer.lamps(probes)
+    return bake.cut(coefficients.astype(np.float32), np.full(len(coefficients), np.nan, np.float32))
