@@ -3,6 +3,8 @@
 import bpy
 import numpy as np
 
+from .sockets import source_of
+
 NOT_READ = "its nodes are not a plain Emission, so they are not read and it shines with its colour and power alone"
 
 
@@ -19,7 +21,7 @@ def node_factor(lamp) -> tuple[np.ndarray, str | None]:
     output = lamp.node_tree.get_output_node("CYCLES")
     if output is None:
         return np.zeros(3), None
-    source = _source(output.inputs["Surface"])
+    source = source_of(output.inputs["Surface"])
     if source is None:
         return np.zeros(3), None
     node = source.node
@@ -31,20 +33,8 @@ def node_factor(lamp) -> tuple[np.ndarray, str | None]:
     return color * strength, None
 
 
-def _source(socket):
-    """The output socket that feeds an input through reroutes, or None."""
-    while socket.is_linked:
-        link = socket.links[0]
-        if link.is_muted:
-            return None
-        if link.from_node.type != "REROUTE":
-            return link.from_socket
-        socket = link.from_node.inputs[0]
-    return None
-
-
 def _color(socket):
-    source = _source(socket)
+    source = source_of(socket)
     if source is None:
         return np.array(socket.default_value[:3])
     if source.node.type == "RGB":
@@ -57,7 +47,7 @@ def _color(socket):
 
 
 def _strength(socket):
-    source = _source(socket)
+    source = source_of(socket)
     if source is None:
         return float(socket.default_value)
     if source.node.type == "VALUE":

@@ -65,7 +65,7 @@ def _prepare(scene, layer_name):
     render.resolution_x = render.resolution_y = 16
     render.resolution_percentage = 100
     for option in ("use_compositing", "use_sequencer", "use_border", "use_motion_blur", "use_multiview", "use_freestyle",
-                   "use_simplify_render_only", "use_persistent_data", "use_stamp"):
+                   "use_persistent_data", "use_stamp"):
         if hasattr(render, option):
             setattr(render, option, False)
     for layer in scene.view_layers:

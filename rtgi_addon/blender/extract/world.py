@@ -5,6 +5,7 @@ import numpy as np
 
 from ...scene import World
 from .panorama import render_panorama
+from .sockets import source_of
 
 # Image pixels in these colour spaces are scene-linear as Blender hands them out.
 _LINEAR_SPACES = {"Linear Rec.709", "Non-Color", "Linear", "Raw"}
@@ -23,13 +24,13 @@ def read_world(world, notes: list[str]) -> World:
     if world.node_tree is None or (bpy.app.version < (5, 0, 0) and not world.use_nodes):
         return World.constant(np.array(world.color))
     output = world.node_tree.get_output_node("CYCLES")
-    surface = _source(output.inputs["Surface"]) if output is not None else None
+    surface = source_of(output.inputs["Surface"]) if output is not None else None
     if surface is None:
         return World.constant(0.0)
     background = surface.node
     if background.type == "BACKGROUND" and not background.mute and not background.inputs["Strength"].is_linked:
         strength = max(float(background.inputs["Strength"].default_value), 0.0)
-        color = _source(background.inputs["Color"])
+        color = source_of(background.inputs["Color"])
         if color is None:
             return World.constant(np.maximum(background.inputs["Color"].default_value[:3], 0.0) * strength)
         if strength == 0.0:
@@ -67,7 +68,7 @@ def _environment(node, strength, notes):
 
 def _rotation(socket):
     """map_from_world (3, 3) of an Environment Texture's Vector input: None unless it is a rotation of the world's directions."""
-    source = _source(socket)
+    source = source_of(socket)
     if source is None:
         return np.eye(3)
     if _is_direction(source):
@@ -76,7 +77,7 @@ def _rotation(socket):
     if node.type != "MAPPING" or node.mute or any(node.inputs[name].is_linked for name in ("Location", "Rotation", "Scale")
                                                   if name in node.inputs):
         return None
-    vector = _source(node.inputs["Vector"])
+    vector = source_of(node.inputs["Vector"])
     if vector is None or not _is_direction(vector):
         return None
     scale = np.array(node.inputs["Scale"].default_value)
@@ -92,15 +93,3 @@ def _rotation(socket):
 def _is_direction(source) -> bool:
     """True for the socket that gives a world shader the direction of view."""
     return source.node.type == "TEX_COORD" and source.name in {"Generated", "Object"} and source.node.object is None
-
-
-def _source(socket):
-    """The output socket that feeds an input through reroutes, or None."""
-    while socket.is_linked:
-        link = socket.links[0]
-        if link.is_muted:
-            return None
-        if link.from_node.type != "REROUTE":
-            return link.from_socket
-        socket = link.from_node.inputs[0]
-    return None
