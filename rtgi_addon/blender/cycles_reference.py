@@ -22,7 +22,7 @@ import bpy
 import numpy as np
 
 from ..errors import BakeError
-from ..numerics import grid, sh
+from ..numerics import grid, sampling, sh
 
 CAMERA_SHADER = """
 shader camera(float origins[{floats}] = {{ {origins} }},
@@ -82,6 +82,33 @@ def volume_points(scene: bpy.types.Scene) -> np.ndarray:
             resolution = (data.resolution_x, data.resolution_y, data.resolution_z)
             found.append(grid.lattice_points(np.array(item.matrix_world), resolution).reshape(-1, 3))
     return np.concatenate(found)
+
+
+def points_in_the_open(scene: bpy.types.Scene, points_world: np.ndarray, clearance: float, count: int) -> np.ndarray:
+    """Ascending indices of at most ``count`` of ``points_world`` (n, 3) that lie outside solids, at least ``clearance`` [m] from
+    every surface, and far from one another (each is the farthest from those before it)."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    directions = sampling.fibonacci_sphere(192)
+
+    def in_the_open(point):
+        behind, nearest = 0, np.inf
+        for direction in directions:
+            hit, place, normal, *_ = scene.ray_cast(depsgraph, point, direction)
+            if hit:
+                behind += normal.dot(direction) > 0
+                nearest = min(nearest, float(np.linalg.norm(np.array(place) - point)))
+        return behind <= 0.1 * len(directions) and nearest >= clearance
+
+    found = np.array([index for index, point in enumerate(points_world) if in_the_open(point)], np.int64)
+    if len(found) == 0:
+        raise BakeError("no point of the lattice lies in the open", "move the volume or make its resolution higher")
+    open_points = points_world[found]
+    chosen = [0]
+    distance = np.linalg.norm(open_points - open_points[0], axis=1)
+    while len(chosen) < min(count, len(found)):
+        chosen.append(int(distance.argmax()))
+        distance = np.minimum(distance, np.linalg.norm(open_points - open_points[chosen[-1]], axis=1))
+    return np.sort(found[chosen])
 
 
 def render_probes(points_world, settings: CyclesSettings | None = None, scene: bpy.types.Scene | None = None,

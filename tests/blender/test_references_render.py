@@ -6,7 +6,14 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="needs Blender's Python module")
 
 from rtgi_addon.blender import cycles_reference  # noqa: E402
-from rtgi_addon.blender.cycles_reference import CyclesSettings, octahedral_directions, render_probes, volume_points  # noqa: E402
+from rtgi_addon.blender.cycles_reference import (  # noqa: E402
+    CyclesSettings,
+    octahedral_directions,
+    points_in_the_open,
+    render_probes,
+    volume_points,
+)
+from rtgi_addon.errors import BakeError  # noqa: E402
 from rtgi_addon.numerics import sh  # noqa: E402
 
 METHODS = ["panorama"] + (["tiles"] if bpy.app.build_options.cycles_osl else [])
@@ -160,3 +167,15 @@ def test_volume_points_are_cell_centred_and_x_runs_fastest(empty_blend):
     assert points.shape == (24, 3)
     assert np.allclose(points[:3], [(9.5, -2.0, -3.0), (10.5, -2.0, -3.0), (9.5, 0.0, -3.0)])
     assert np.allclose(points[6], (9.5, -2.0, -1.0))
+
+
+def test_points_in_the_open_keep_clear_of_solids_and_of_one_another(empty_blend):
+    bpy.ops.mesh.primitive_cube_add(size=2.0)
+    x = np.linspace(-3.0, 3.0, 25)
+    points = np.stack((x, np.zeros(25), np.zeros(25)), axis=1)
+    chosen = points_in_the_open(bpy.context.scene, points, 0.3, 25)
+    assert np.array_equal(chosen, np.flatnonzero(np.abs(x) >= 1.3))
+    pair = points_in_the_open(bpy.context.scene, points, 0.3, 2)
+    assert x[pair].tolist() == [-3.0, 3.0]
+    with pytest.raises(BakeError, match="no point"):
+        points_in_the_open(bpy.context.scene, points, 9.0, 2)

@@ -18,41 +18,12 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 sys.path.insert(0, str(ROOT))
 
-from rtgi_addon.blender.cycles_reference import CyclesSettings, render_probes, volume_points  # noqa: E402
-from rtgi_addon.numerics import sampling  # noqa: E402
+from rtgi_addon.blender.cycles_reference import CyclesSettings, points_in_the_open, render_probes, volume_points  # noqa: E402
 
 SAMPLES = ("cornell_box", "furnace", "integrating_sphere", "two_rooms", "corridor_door_ajar", "sky_courtyard", "sun_window",
            "atrium", "many_lights", "outdoor_hdri", "adversarial")
 PROBES = 24
 TILE, SPP, BOUNCES = 128, 8, 64
-
-
-def open_points(points: np.ndarray, clearance: float) -> np.ndarray:
-    """Indices of ``points`` (n, 3) that lie outside solids and at least ``clearance`` [m] from every surface."""
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    scene = bpy.context.scene
-    directions = sampling.fibonacci_sphere(192)
-    keep = []
-    for index, point in enumerate(points):
-        behind, nearest = 0, np.inf
-        for direction in directions:
-            hit, place, normal, *_ = scene.ray_cast(depsgraph, point, direction)
-            if hit:
-                behind += normal.dot(direction) > 0
-                nearest = min(nearest, float(np.linalg.norm(np.array(place) - point)))
-        if behind <= 0.1 * len(directions) and nearest >= clearance:
-            keep.append(index)
-    return np.array(keep, np.int64)
-
-
-def spread(points: np.ndarray, count: int) -> np.ndarray:
-    """Indices of up to ``count`` of ``points`` (n, 3), each the farthest from those before it."""
-    chosen = [0]
-    distance = np.linalg.norm(points - points[0], axis=1)
-    while len(chosen) < min(count, len(points)):
-        chosen.append(int(distance.argmax()))
-        distance = np.minimum(distance, np.linalg.norm(points - points[chosen[-1]], axis=1))
-    return np.sort(chosen)
 
 
 def relative_error(mean: np.ndarray, variance: np.ndarray) -> float:
@@ -67,8 +38,7 @@ def build(name: str, target: float, seconds: float, threads: int | None) -> None
     resolution = np.array((volume.data.resolution_x, volume.data.resolution_y, volume.data.resolution_z))
     lattice = volume_points(bpy.context.scene)
     clearance = 0.2 * float((np.array(volume.scale) * 2 / resolution).min())
-    flat = open_points(lattice, clearance)
-    flat = flat[spread(lattice[flat], PROBES)]
+    flat = points_in_the_open(bpy.context.scene, lattice, clearance, PROBES)
     started = time.perf_counter()
     estimates = []
     while len(estimates) < 4 or time.perf_counter() - started < seconds:
