@@ -123,16 +123,21 @@ class ProbeBake:
         return np.unique(probes // GROUP, return_inverse=True)[1].reshape(-1)
 
     def _items(self) -> list[Item]:
-        """The rays of this round cut into items: probes of one group with the same first and last ray."""
+        """The rays of this round cut into items: groups with equally many probes that have the same first and last ray."""
         items, before = [], self.model.rays
         probes = np.flatnonzero(self._goal > before)
         key = np.stack([probes // GROUP, before[probes], self._goal[probes]], axis=1)
-        distinct, which = np.unique(key, axis=0, return_inverse=True)
-        which = which.reshape(-1)
-        for number, (group, first, last) in enumerate(distinct.tolist()):
-            members = probes[which == number]
-            step = max(RAYS_PER_LIGHT_SAMPLE, ITEM_RAYS // len(members) // RAYS_PER_LIGHT_SAMPLE * RAYS_PER_LIGHT_SAMPLE)
-            items += [Item(group, members, start, min(start + step, last)) for start in range(first, last, step)]
+        distinct, which, sizes = np.unique(key, axis=0, return_inverse=True, return_counts=True)
+        members = np.split(probes[np.argsort(which.reshape(-1), kind="stable")], np.cumsum(sizes)[:-1])
+        for first, last, size in np.unique(np.column_stack([distinct[:, 1:], sizes]), axis=0).tolist():
+            alike = np.flatnonzero((distinct[:, 1:] == (first, last)).all(axis=1) & (sizes == size))
+            step = max(RAYS_PER_LIGHT_SAMPLE, ITEM_RAYS // size // RAYS_PER_LIGHT_SAMPLE * RAYS_PER_LIGHT_SAMPLE)
+            for start in range(first, last, step):
+                stop = min(start + step, last)
+                count = max(1, ITEM_RAYS // (size * (stop - start)))
+                for begin in range(0, len(alike), count):
+                    chosen = alike[begin:begin + count]
+                    items.append(Item(distinct[chosen, 0], np.stack([members[row] for row in chosen]), start, stop))
         return items
 
     def _trace_round(self) -> None:
@@ -164,7 +169,7 @@ class ProbeBake:
                                 progress.span(0.6, 1.0), label)
         for item, hits, texel, one in zip(batch, traced, texels, gathered, strict=True):
             self._sums[item.probes] += one.sh
-            self._distance[item.probes] += one.distance.transpose(1, 0, 2)
+            self._distance[item.probes] += one.distance
             self._distance_weight[item.probes] += one.distance_weight
             self.memory.keep(item, hits, texel, one)
             if one.emitted is not None:

@@ -1,7 +1,7 @@
 """Rays from probes: traced in one pass, shaded from the surface cache in the next, projected onto SH.
 
-A work item is a group of neighbouring probes that share their directions: SH projection is then one matrix product, and rays
-of one direction from nearby points find the same part of the BVH. Groups are scrambled independently of one another.
+A few neighbouring probes share their directions: SH projection is then a matrix product, and rays of one direction from nearby
+points find the same part of the BVH. Groups are scrambled independently of one another, so their errors are too.
 """
 
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...numerics import octahedral, sh
-from ...numerics.sampling import hash_u32, sobol_owen, sphere_from_square
+from ...numerics.sampling import hash_u32, sobol_owen, sobol_owen_at, sphere_from_square
 from ...transport.context import LightContext
 from ...transport.surface_cache import SurfaceCache
 from ...transport.texel_light import ALL_SOURCES, CHOICES
@@ -17,7 +17,7 @@ from ...transport.texel_table import SurfaceHits
 from ...transport.vectors import dot
 
 # Probes that share a set of directions.
-GROUP = 64
+GROUP = 8
 # One emitter (and one bright world) sample for so many rays.
 RAYS_PER_LIGHT_SAMPLE = 8
 # Samples of each lamp that has an extent, where its direct light is wanted.
@@ -30,24 +30,33 @@ _UNIFORM_PDF = np.float32(1.0 / (4.0 * np.pi))
 
 @dataclass(frozen=True, eq=False)
 class Item:
-    """Rays ``first`` … ``last`` − 1 of the sequence of ``group`` from ``probes`` (m,), all of that group; both ends are
-    multiples of RAYS_PER_LIGHT_SAMPLE."""
+    """Rays ``first`` … ``last`` − 1 of the sequences of some ``groups`` (g,), each for as many of its probes: ``probes`` (g, m).
+    Both ends are multiples of RAYS_PER_LIGHT_SAMPLE. Its rays are ordered group by group, direction by direction: (g, n, m)."""
 
-    group: int
+    groups: np.ndarray
     probes: np.ndarray
     first: int
     last: int
 
     @property
+    def shape(self) -> tuple[int, int, int]:
+        """(g, n, m)."""
+        return len(self.groups), self.last - self.first, self.probes.shape[1]
+
+    @property
     def ray_count(self) -> int:
         """Rays in the item."""
-        return len(self.probes) * (self.last - self.first)
+        return self.probes.size * (self.last - self.first)
+
+    def probe_of(self, rows: np.ndarray) -> np.ndarray:
+        """The probe (h,) that each of the rays ``rows`` (h,) leaves from."""
+        _, n, m = self.shape
+        return self.probes.reshape(-1)[rows // (n * m) * m + rows % m]
 
 
 @dataclass(eq=False)
 class Traced:
-    """What an item's rays met: ``rows`` (h,) of those (n·m, direction by direction) that hit ``surface`` (h,) at ``t`` (h,), and the
-    ``directions`` (n, 3)."""
+    """What an item's rays met: ``rows`` (h,) of those that hit ``surface`` (h,) at ``t`` (h,), and the ``directions`` (g·n, 3)."""
 
     surface: SurfaceHits
     rows: np.ndarray
@@ -57,7 +66,7 @@ class Traced:
 
 @dataclass(eq=False)
 class Gathered:
-    """An item's sums: ``sh`` (m, k, 3) the sum over its rays of 4π·L·Y (divide by the number of rays), ``emitted`` what of it is
+    """An item's sums: ``sh`` (g, m, k, 3) the sum over its rays of 4π·L·Y (divide by the number of rays), ``emitted`` what of it is
     light from emissive surfaces (None where nothing emits), ``albedo`` (h, 3) at the hits (None where it is each triangle's own),
     and for visibility the weighted sums (T², m, 2) of distance and squared distance with their weights (T²,)."""
 
@@ -83,18 +92,21 @@ class Gatherer:
     def trace(self, item: Item) -> Traced:
         """Nearest hits of an item's rays."""
         directions = self.directions(item)
-        m = len(item.probes)
-        rays = np.repeat(directions, m, axis=0)
-        origins = np.tile(self._placement.positions[item.probes], (len(directions), 1))
-        hits = self._context.tracer.intersect(origins, rays)
+        rays = np.repeat(directions, item.shape[2], axis=0)
+        hits = self._context.tracer.intersect(self._origins(item, item.shape[1]), rays)
         rows = np.flatnonzero(hits.primitive >= 0)
         primitive, u, v = hits.primitive[rows], hits.u[rows], hits.v[rows]
         front = dot(self._context.geometry.normals_world[primitive], rays[rows]) < 0
         return Traced(SurfaceHits(primitive, u, v, self._cache.layout.slots(primitive, u, v, front)), rows, hits.t[rows], directions)
 
     def directions(self, item: Item) -> np.ndarray:
-        """Directions (n, 3) that the item's probes share."""
-        return sphere_from_square(self._numbers(item, 2))
+        """Directions (g·n, 3) that the probes of each group share."""
+        return sphere_from_square(self._numbers(item, 2).reshape(-1, 2))
+
+    def _origins(self, item: Item, n: int) -> np.ndarray:
+        """Where ``n`` rays from each probe start: (g·n·m, 3)."""
+        positions = self._placement.positions[item.probes][:, None]
+        return np.broadcast_to(positions, (len(item.groups), n, *positions.shape[2:])).reshape(-1, 3)
 
     def under(self, context: LightContext, cache: SurfaceCache) -> "Gatherer":
         """The same probes and directions under other light."""
@@ -104,21 +116,26 @@ class Gatherer:
         return other
 
     def _numbers(self, item: Item, last: int, first: int = 0) -> np.ndarray:
-        points = sobol_owen(item.last - item.first, last, hash_u32(self._seed, item.group), start=item.first)
-        return points[:, first:]
+        """Dimensions ``first`` … ``last`` − 1 of the groups' sequences: (g, n, last − first)."""
+        index = np.arange(item.first, item.last, dtype=np.uint32)
+        return sobol_owen_at(index, last, hash_u32(self._seed, item.groups)[:, None])[..., first:]
+
+    def _light_numbers(self, item: Item, dimensions: int, purpose: int) -> np.ndarray:
+        """(g, n / RAYS_PER_LIGHT_SAMPLE, dimensions) for samples of one kind of light, in step with the rays."""
+        index = np.arange(item.first // RAYS_PER_LIGHT_SAMPLE, item.last // RAYS_PER_LIGHT_SAMPLE, dtype=np.uint32)
+        return sobol_owen_at(index, dimensions, hash_u32(self._seed, item.groups, purpose)[:, None])
 
     def shade(self, item: Item, traced: Traced, texel: np.ndarray | None) -> Gathered:
         """Radiance along the traced rays, projected. ``texel`` (h,) is the cache's for each hit, None where nothing is reflected."""
-        m, n = len(item.probes), item.last - item.first
-        radiance = np.zeros((n, m, 3), np.float32)
+        radiance = np.zeros((*item.shape, 3), np.float32)
         albedo = None
         if texel is not None:
             hits = traced.surface
             albedo = self._context.surfaces.albedo(hits.primitive, hits.u, hits.v) if self._albedo is None else None
             radiance.reshape(-1, 3)[traced.rows] = self._reflected(item, traced, texel, albedo)
         if not self._context.environment.is_black:
-            radiance += self.sky(traced, n, m)
-        basis = sh.evaluate(traced.directions, self._order)
+            radiance += self.sky(item, traced)
+        basis = self.basis(item, traced.directions)
         total = project(basis, radiance) * np.float32(4.0 * np.pi) + self._light_samples(item, texel is not None)
         emitted = None
         if self._context.surfaces.has_emission:
@@ -128,12 +145,16 @@ class Gatherer:
             total = total + emitted
         return Gathered(total, emitted, albedo, *self._visibility(item, traced))
 
-    def sky(self, traced: Traced, n: int, m: int) -> np.ndarray:
-        """Radiance (n, m, 3) of the world, without its bright patches, along the rays that hit nothing; 0 along the others."""
-        missed = np.ones(n * m, bool)
+    def basis(self, item: Item, directions: np.ndarray) -> np.ndarray:
+        """SH basis (g, n, k) of directions (g·n, 3)."""
+        return sh.evaluate(directions, self._order).reshape(len(item.groups), -1, sh.coefficient_count(self._order))
+
+    def sky(self, item: Item, traced: Traced) -> np.ndarray:
+        """Radiance (g, n, m, 3) of the world, without its bright patches, along the rays that hit nothing; 0 along the others."""
+        missed = np.ones(item.ray_count, bool)
         missed[traced.rows] = False
-        sky = self._context.environment.base_radiance(traced.directions)
-        return np.where(missed.reshape(n, m, 1), sky[:, None, :], np.float32(0))
+        sky = self._context.environment.base_radiance(traced.directions).reshape(*item.shape[:2], 1, 3)
+        return np.where(missed.reshape(*item.shape, 1), sky, np.float32(0))
 
     def _reflected(self, item: Item, traced: Traced, texel: np.ndarray, albedo: np.ndarray | None) -> np.ndarray:
         cache = self._cache
@@ -158,7 +179,7 @@ class Gatherer:
 
     def _density(self, item: Item, traced: Traced, rows: np.ndarray) -> np.ndarray:
         """Density (n,) [m⁻²] of probe rays on the surfaces that the given hits met."""
-        directions = traced.directions[traced.rows[rows] // len(item.probes)]
+        directions = traced.directions[traced.rows[rows] // item.shape[2]]
         cosine = np.abs(dot(self._context.geometry.normals_world[traced.surface.primitive[rows]], directions))
         return _UNIFORM_PDF * cosine / np.maximum(traced.t[rows] ** 2, np.float32(1e-20))
 
@@ -166,8 +187,8 @@ class Gatherer:
         """Irradiance (h, 3) of lamps and bright sky at hits: one shadow ray for each of a few sources, or for one chosen; less what
         is sampled as a bright surface."""
         cache, hits, rows = self._cache, traced.surface, traced.rows
-        step, probe = np.divmod(rows, len(item.probes))
-        points = self._placement.positions[item.probes][probe] + traced.directions[step] * traced.t[:, None]
+        points = np.take(traced.directions, rows // item.shape[2], axis=0) * traced.t[:, None]
+        points += self._placement.positions[item.probe_of(rows)]
         side = np.where(hits.slots & 1, np.float32(1), np.float32(-1))[:, None]
         face = self._context.geometry.normals_world[hits.primitive] * side
         surfaces = self._context.surfaces
@@ -191,55 +212,54 @@ class Gatherer:
         return total
 
     def _shifted(self, item: Item, first: int, last: int) -> np.ndarray:
-        """(n·m, last − first): the sequence's further dimensions, shifted on the torus for each probe by a hash."""
-        shift = np.stack([hash_u32(item.probes, d, self._seed, 17) for d in range(first, last)], axis=-1)
-        numbers = self._numbers(item, last, first)[:, None] + (shift >> np.uint32(8)).astype(np.float32) * np.float32(2.0**-24)
+        """(g·n·m, last − first): the sequences' further dimensions, shifted on the torus for each probe by a hash."""
+        shift = np.stack([_fraction(hash_u32(item.probes, d, self._seed, 17)) for d in range(first, last)], axis=-1)
+        numbers = self._numbers(item, last, first)[:, :, None] + shift[:, None]
         return (numbers - np.floor(numbers)).reshape(-1, last - first)
 
     def _light_samples(self, item: Item, reflected: bool) -> np.ndarray:
-        """Sums (m, k, 3), in the units of Gathered.sh, of bright sky and bright surfaces sampled from the probes."""
-        total, surfaces = np.zeros((len(item.probes), sh.coefficient_count(self._order), 3), np.float32), self._cache.bright
+        """Sums (g, m, k, 3), in the units of Gathered.sh, of bright sky and bright surfaces sampled from the probes."""
+        surfaces, count = self._cache.bright, sh.coefficient_count(self._order)
+        total = np.zeros((*item.probes.shape, count, 3), np.float32)
+        if item.shape[1] < RAYS_PER_LIGHT_SAMPLE:
+            return total
         if self._context.environment.bright.count:
             total += self.bright_sky(item)
-        n, m, origins, start = self._light_sample_frame(item)
-        if n and reflected and surfaces.count:
+        if reflected and surfaces.count:
             # Each probe meets its own points of the pool, in the sequence's order.
-            shift = (hash_u32(item.probes, self._seed, 5) >> np.uint32(8)).astype(np.float32) * np.float32(2.0**-24)
-            numbers = sobol_owen(n, 1, hash_u32(self._seed, item.group, 5), start=start) + shift
-            total += self._balanced(surfaces.connect((numbers - np.floor(numbers)).reshape(-1), origins, None), n, m)
+            numbers = self._light_numbers(item, 1, 5) + _fraction(hash_u32(item.probes, self._seed, 5))[:, None]
+            numbers = (numbers - np.floor(numbers)).reshape(-1)
+            total += self._balanced(item, surfaces.connect(numbers, self._origins(item, item.shape[1] // RAYS_PER_LIGHT_SAMPLE), None))
         return total
 
     def bright_sky(self, item: Item) -> np.ndarray:
-        """The part of ``_light_samples`` that comes from bright patches of the world (m, k, 3)."""
-        n, m, origins, start = self._light_sample_frame(item)
-        xi = sobol_owen(n, 2, hash_u32(self._seed, item.group, 3), start=start)
-        directions, weight = self._context.environment.bright.sample(xi)
-        free = ~self._context.tracer.occluded(origins, np.repeat(directions, m, axis=0))
-        seen = np.where(free.reshape(n, m, 1), weight[:, None, :], np.float32(0))
-        return project(sh.evaluate(directions, self._order), seen) * np.float32(RAYS_PER_LIGHT_SAMPLE)
+        """The part of ``_light_samples`` that comes from bright patches of the world (g, m, k, 3)."""
+        g, n, m = item.shape
+        n //= RAYS_PER_LIGHT_SAMPLE
+        directions, weight = self._context.environment.bright.sample(self._light_numbers(item, 2, 3).reshape(-1, 2))
+        free = ~self._context.tracer.occluded(self._origins(item, n), np.repeat(directions, m, axis=0))
+        seen = np.where(free.reshape(g, n, m, 1), weight.reshape(g, n, 1, 3), np.float32(0))
+        return project(self.basis(item, directions), seen) * np.float32(RAYS_PER_LIGHT_SAMPLE)
 
     def _emitter_samples(self, item: Item) -> np.ndarray | np.float32:
         """As ``_light_samples``, for emissive triangles."""
-        n, m, origins, start = self._light_sample_frame(item)
+        n = item.shape[1] // RAYS_PER_LIGHT_SAMPLE
         if n == 0 or not self._sample_emitters:
             return np.float32(0)
-        xi = sobol_owen(n, 3, hash_u32(self._seed, item.group, 4), start=start)
-        return self._balanced(self._connect_emitters(xi, origins, m), n, m)
+        return self._balanced(item, self._connect_emitters(self._light_numbers(item, 3, 4).reshape(-1, 3), self._origins(item, n),
+                                                           item.shape[2]))
 
-    def _light_sample_frame(self, item: Item):
-        n, m = (item.last - item.first) // RAYS_PER_LIGHT_SAMPLE, len(item.probes)
-        return n, m, np.tile(self._placement.positions[item.probes], (n, 1)), item.first // RAYS_PER_LIGHT_SAMPLE
-
-    def _balanced(self, connection, n: int, m: int) -> np.ndarray:
-        """Sum (m, k, 3) of n·m connections by the balance heuristic over rays and samples together, both counted per ray."""
+    def _balanced(self, item: Item, connection) -> np.ndarray:
+        """Sums (g, m, k, 3) of connections by the balance heuristic over rays and samples together, both counted per ray."""
         directions, at_light, density, emission = connection
+        g, n, m = len(item.groups), item.shape[1] // RAYS_PER_LIGHT_SAMPLE, item.shape[2]
         at_light = np.maximum(at_light, 0)
         weight = at_light / np.maximum(_UNIFORM_PDF * at_light + density / RAYS_PER_LIGHT_SAMPLE, 1e-30)
-        basis = np.ascontiguousarray(sh.evaluate(directions, self._order)).reshape(n, m, -1)
-        return np.matmul(basis.transpose(1, 2, 0), (emission * weight[:, None]).reshape(n, m, 3).transpose(1, 0, 2))
+        basis = np.ascontiguousarray(sh.evaluate(directions, self._order)).reshape(g, n, m, -1)
+        return np.matmul(basis.transpose(0, 2, 3, 1), (emission * weight[:, None]).reshape(g, n, m, 3).transpose(0, 2, 1, 3))
 
     def lamps(self, probes: np.ndarray) -> np.ndarray:
-        """The direct light of lamps as SH coefficients (m, k, 3)."""
+        """The direct light of lamps as SH coefficients (m, k, 3) of ``probes`` (m,)."""
         sources, points = self._cache.sources, self._placement.positions[probes]
         result = np.zeros((len(probes), sh.coefficient_count(self._order), 3))
         for lamp in range(self._context.lamps.count):
@@ -250,7 +270,7 @@ class Gatherer:
         return result
 
     def _connect_emitters(self, xi: np.ndarray, origins: np.ndarray, m: int):
-        """As BrightSurfaces.connect, for emissive triangles: n samples shared by m probes."""
+        """As BrightSurfaces.connect, for emissive triangles: each sample is shared by m probes."""
         target, normal, emission, pdf_area, _ = (np.repeat(part, m, axis=0) for part in self._context.emitters.sample(xi))
         towards = target - origins
         squared = np.maximum(dot(towards, towards), np.float32(1e-20))
@@ -261,15 +281,16 @@ class Gatherer:
         return directions, at_light, pdf_area, np.where(free[:, None], emission, np.float32(0))
 
     def _visibility(self, item: Item, traced: Traced) -> tuple[np.ndarray, np.ndarray]:
-        m, n = len(item.probes), item.last - item.first
-        reach = self._placement.reach[item.probes]
-        t = np.full(n * m, np.inf, np.float32)
+        g, n, m = item.shape
+        t = np.full(item.ray_count, np.inf, np.float32)
         t[traced.rows] = traced.t
-        t = np.minimum(t.reshape(n, m), reach)
-        cosine = np.maximum(traced.directions @ self._tile_directions.T, 0)
-        weight = (cosine ** np.float32(_VISIBILITY_SHARPNESS)).astype(np.float32)
-        both = np.concatenate([t, t * t], axis=1)
-        return (weight.T @ both).reshape(-1, 2, m).transpose(0, 2, 1), weight.sum(axis=0)
+        t = np.minimum(t.reshape(g, n, m), self._placement.reach[item.probes][:, None])
+        # A power of the cosine through its logarithm is half the cost of the power itself.
+        cosine = np.maximum(traced.directions @ self._tile_directions.T, np.float32(1e-20))
+        weight = np.exp(np.float32(_VISIBILITY_SHARPNESS) * np.log(cosine)).reshape(g, n, -1)
+        both = np.concatenate([t, t * t], axis=2)
+        sums = np.matmul(weight.transpose(0, 2, 1), both).reshape(g, -1, 2, m)
+        return sums.transpose(0, 3, 1, 2), weight.sum(axis=1)[:, None, :]
 
 
 def _turn(numbers: np.ndarray, source: int) -> np.ndarray:
@@ -278,7 +299,12 @@ def _turn(numbers: np.ndarray, source: int) -> np.ndarray:
     return turned - np.floor(turned)
 
 
+def _fraction(hashed: np.ndarray) -> np.ndarray:
+    return (hashed >> np.uint32(8)).astype(np.float32) * np.float32(2.0**-24)
+
+
 def project(basis: np.ndarray, radiance: np.ndarray) -> np.ndarray:
-    """Sum over directions of ``basis`` (n, k) times ``radiance`` (n, m, 3): (m, k, 3)."""
-    n, m, _ = radiance.shape
-    return (basis.T @ radiance.reshape(n, m * 3)).reshape(-1, m, 3).transpose(1, 0, 2)
+    """Sum over directions of ``basis`` (g, n, k) times ``radiance`` (g, n, m, 3): (g, m, k, 3)."""
+    g, n, m, channels = radiance.shape
+    products = np.matmul(basis.transpose(0, 2, 1), radiance.reshape(g, n, m * channels))
+    return products.reshape(g, -1, m, channels).transpose(0, 2, 1, 3)

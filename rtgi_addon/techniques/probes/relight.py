@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import BakeError
-from ...numerics import sh
 from ...progress import Progress
 from ...scene import Scene
 from ...transport.parallel import parallel_for
 from ..base import ProbeGrid
+from .gather import project
 
 # Hits of this many rays are kept (4 bytes each, and 6 more where albedo varies within triangles).
 MAX_KEPT_RAYS = 1 << 25
@@ -17,7 +17,8 @@ MAX_KEPT_RAYS = 1 << 25
 
 @dataclass(frozen=True, eq=False)
 class _Kept:
-    """An item's memory: the texel (n, m) of each ray, and the albedo there (n, m, 3) float16 or None where the texel's will do."""
+    """An item's memory: the texel (g, n, m) of each ray, and the albedo there (g, n, m, 3) float16 or None where the texel's
+    will do."""
 
     item: object
     texel: np.ndarray
@@ -41,15 +42,14 @@ class HitMemory:
         if self.items is None or texel is None or self._rays > MAX_KEPT_RAYS:
             self.forget()
             return
-        n, m = item.last - item.first, len(item.probes)
-        whole = np.full(n * m, -1, np.int32)
+        whole = np.full(item.ray_count, -1, np.int32)
         whole[traced.rows] = texel
         albedo = None
         if gathered.albedo is not None:
-            albedo = np.zeros((n * m, 3), np.float16)
+            albedo = np.zeros((item.ray_count, 3), np.float16)
             albedo[traced.rows] = gathered.albedo
-            albedo = albedo.reshape(n, m, 3)
-        self.items.append(_Kept(item, whole.reshape(n, m), albedo))
+            albedo = albedo.reshape(*item.shape, 3)
+        self.items.append(_Kept(item, whole.reshape(item.shape), albedo))
 
 
 def relight(bake, scene: Scene, progress: Progress) -> tuple[ProbeGrid, ...]:
@@ -71,22 +71,18 @@ def relight(bake, scene: Scene, progress: Progress) -> tuple[ProbeGrid, ...]:
     by_texel = reflected.copy()
     by_texel[:, :3] *= cache.albedo
     gatherer = bake.gatherer.under(context, cache)
-    order = bake.settings.order
     sums = np.zeros_like(bake.model.total)
 
     def work(i):
         kept = bake.memory.items[i]
-        n, m = kept.texel.shape
         directions = gatherer.directions(kept.item)
         radiance = np.take(reflected if kept.albedo is not None else by_texel, kept.texel, axis=0, mode="wrap")
         if kept.albedo is not None:
             radiance[..., :3] *= kept.albedo
         if not context.environment.is_black:
-            sky = context.environment.base_radiance(directions)
-            radiance[..., :3] += np.where((kept.texel < 0)[:, :, None], sky[:, None, :], np.float32(0))
-        basis = sh.evaluate(directions, order)
-        projected = (basis.T @ radiance.reshape(n, m * 4)).reshape(-1, m, 4)[:, :, :3].transpose(1, 0, 2)
-        projected = projected * np.float32(4.0 * np.pi)
+            sky = context.environment.base_radiance(directions).reshape(*kept.item.shape[:2], 1, 3)
+            radiance[..., :3] += np.where((kept.texel < 0)[..., None], sky, np.float32(0))
+        projected = project(gatherer.basis(kept.item, directions), radiance)[..., :3] * np.float32(4.0 * np.pi)
         return projected + gatherer.bright_sky(kept.item) if context.environment.bright.count else projected
 
     parts = parallel_for(work, len(bake.memory.items), context.threads, progress.span(0.7, 1.0), "relighting probes")
