@@ -98,17 +98,11 @@ PROCEDURAL = {"noise": noise, "object noise": object_noise, "ramp": ramp_of_nois
               "groups": noise_in_groups, "screen": screen_of_images, "box": box_projection, "hue": constant_hue}
 
 
-@pytest.fixture(autouse=True)
-def small_textures(monkeypatch):
-    """Quick bakes."""
-    monkeypatch.setattr(fallback, "RESOLUTION", 512)
-
-
 @pytest.fixture(params=["texture", "corners"])
 def carrier(request, monkeypatch):
     """Both ways a bake can be carried: a texture over its own UV map, or corner attributes."""
     if request.param == "corners":
-        monkeypatch.setattr(fallback, "TEXTURE_POLYGONS", 0)
+        monkeypatch.setattr(fallback, "RESOLUTIONS", {})
     return request.param
 
 
@@ -122,7 +116,7 @@ def test_a_baked_material_equals_cycles(empty_blend, carrier, name):
     assert [note for note in reader.notes if "material" in note and "Cycles" in note]
     for channel, kind in ((material.albedo, "DIFFUSE"), (material.emission, "EMIT")):
         difference = np.abs(at_corners(channel, mesh) - cycles_bake(thing, kind)[loops])
-        assert difference.max() < 0.04 and difference.mean() < 5e-3  # half a texel at the rim of a patch
+        assert difference.max() < 0.04 and difference.mean() < 8e-3  # half a texel at the rim of a patch
 
 
 def test_a_texture_resolves_what_corners_cannot(empty_blend):
@@ -179,12 +173,12 @@ def test_only_the_slots_that_need_it_are_baked(empty_blend):
     plain = glowing_material(lambda tree: tree.nodes.new("ShaderNodeRGB").outputs[0])
     for material in (plain, None, glowing_material(object_noise)):
         thing.data.materials.append(material)
-    thing.data.polygons.foreach_set("material_index", np.arange(len(thing.data.polygons), dtype=np.int32) % 4)
+    thing.data.polygons.foreach_set("material_index", np.arange(len(thing.data.polygons), dtype=np.int32) % 5)
     materials, mesh, _reader, loops = read_object(thing)
     assert [material.extraction for material in materials] == ["cycles-bake", "nodes", "nodes", "cycles-bake"]
     expected = cycles_bake(thing, "DIFFUSE")[loops]
     for slot in (0, 3):
-        chosen = mesh.triangle_material == slot
+        chosen = np.minimum(mesh.triangle_material, 3) == slot  # a slot beyond the last means the last
         assert np.abs(at_corners(materials[slot].albedo, mesh) - expected)[chosen].max() < 0.04
 
 
@@ -275,7 +269,7 @@ def test_a_failed_bake_is_an_error_that_names_the_object(empty_blend, monkeypatc
 
 
 def test_patches_of_the_atlas_do_not_overlap():
-    from rtgi_addon.blender.materials.atlas import PADDING, polygon_uv
+    from rtgi_addon.blender.materials.atlas import MINIMUM, PADDING, polygon_uv
 
     rng = np.random.default_rng(3)
     size = rng.uniform(0.01, 2.0, (200, 2))
@@ -288,5 +282,41 @@ def test_patches_of_the_atlas_do_not_overlap():
     assert low.min() >= -1e-3 and high.max() <= 512 + 1e-3
     apart = np.any((low[:, None] >= high[None] - 1e-3) | (high[:, None] <= low[None] + 1e-3), axis=-1)
     assert np.all(apart | np.eye(200, dtype=bool))
-    area = np.prod(high - low - 2 * PADDING, axis=1)
-    assert np.allclose(area / area[0], np.prod(size, axis=1) / np.prod(size[0]), rtol=1e-3)
+    extent = np.sort(high - low - 2 * PADDING, axis=1)
+    scale = extent[:, 1].max() / size.max()
+    assert np.allclose(extent, np.maximum(np.sort(size, axis=1) * scale, MINIMUM), rtol=1e-3)
+    assert np.prod(extent, axis=1).sum() > 0.4 * 512**2
+
+
+def test_polygons_far_smaller_than_a_texel_are_baked_too(empty_blend):
+    thing = grid_object(glowing_material(object_noise), cells=24)
+    for vertex in thing.data.vertices:  # all but the outermost cells shrink to a speck
+        if max(abs(vertex.co.x), abs(vertex.co.y)) < 0.99:
+            vertex.co *= 1e-3
+    bpy.context.view_layer.update()
+    (material,), mesh, _reader, loops = read_object(thing)
+    assert material.albedo.texture is not None
+    difference = np.abs(at_corners(material.albedo, mesh) - cycles_bake(thing, "DIFFUSE")[loops])
+    assert difference.mean() < 0.01
+
+
+@pytest.mark.parametrize("cells, side", [(32, 512), (64, 1024), (65, None)])
+def test_dense_meshes_get_larger_textures_and_then_corners(empty_blend, cells, side):
+    thing = grid_object(glowing_material(noise), cells=cells)
+    (material,), mesh, _reader, loops = read_object(thing)
+    assert (material.albedo.attribute is None) == (side is not None)
+    assert side is None or material.albedo.texture.pixels.shape == (side, side, 3)
+    assert np.abs(at_corners(material.albedo, mesh) - cycles_bake(thing, "DIFFUSE")[loops]).mean() < 5e-3
+
+
+def test_a_very_long_chain_of_nodes_is_baked(empty_blend):
+    def chain(tree):
+        source = noise(tree)
+        for _ in range(300):
+            node = tree.nodes.new("ShaderNodeGamma")
+            tree.links.new(source, node.inputs[0])
+            source = node.outputs[0]
+        return source
+
+    (material,), _mesh, reader, _loops = read_object(grid_object(glowing_material(chain)))
+    assert material.extraction == "cycles-bake" and any("in a row" in note for note in reader.notes)

@@ -4,10 +4,13 @@ import numpy as np
 
 # Texels kept free around a patch, so that bilinear lookups at its border never reach a neighbour.
 PADDING = 2
+# The least texels along a side of a patch: with fewer, a thin polygon may cover no texel's centre and stay unbaked.
+MINIMUM = 3
 
 
 def polygon_uv(positions: np.ndarray, normals: np.ndarray, starts: np.ndarray, counts: np.ndarray, resolution: int) -> np.ndarray:
-    """(loops, 2) float32 UV: each polygon projected on its plane, all at one scale, packed on shelves by falling height.
+    """(loops, 2) float32 UV: each polygon projected on its plane, all at one scale (but for tiny ones, which are stretched),
+    packed on shelves by falling height.
 
     ``positions`` (loops, 3) are the corners, ``normals`` (polygons, 3) unit; polygon i owns loops ``starts[i]`` to
     ``starts[i] + counts[i]``, which must follow each other without gaps. Polygons of no area get patches of no area.
@@ -24,8 +27,9 @@ def polygon_uv(positions: np.ndarray, normals: np.ndarray, starts: np.ndarray, c
     flat = np.stack([np.einsum("ij,ij->i", positions, tangent[polygon]), np.einsum("ij,ij->i", positions, bitangent[polygon])], 1)
     low, high = np.minimum.reduceat(flat, starts), np.maximum.reduceat(flat, starts)
     size = high - low
-    scale, corner = _fit(size, resolution)
-    return ((corner[polygon] + PADDING + (flat - low[polygon]) * scale) / resolution).astype(np.float32)
+    extent, corner = _fit(size, resolution)
+    scale = np.divide(extent, size, out=np.zeros_like(size), where=size > 0)
+    return ((corner[polygon] + PADDING + (flat - low[polygon]) * scale[polygon]) / resolution).astype(np.float32)
 
 
 def _longest(edges: np.ndarray, starts: np.ndarray) -> np.ndarray:
@@ -35,14 +39,20 @@ def _longest(edges: np.ndarray, starts: np.ndarray) -> np.ndarray:
     return order[starts]
 
 
-def _fit(size: np.ndarray, resolution: int) -> tuple[float, np.ndarray]:
-    """The largest scale [texels per metre] at which all patches fit, within 5 %, and their lower left corners in texels."""
-    area = float(np.sum(size[:, 0] * size[:, 1]))
-    scale = resolution / max(np.sqrt(area), float(size.max()), 1e-9)
+def _fit(size: np.ndarray, resolution: int) -> tuple[np.ndarray, np.ndarray]:
+    """((n, 2) extents, (n, 2) lower left corners) of patches in texels, at the largest scale that fits, within 5 %."""
+    border = 2 * PADDING + 1.0
+    area, edge = np.sum(size[:, 0] * size[:, 1]), border * np.sum(size)
+    free = max(resolution**2 - len(size) * border**2, 1.0)
+    scale = (np.sqrt(edge**2 + 4.0 * area * free) - edge) / (2.0 * area) if area > 0 else 1.0  # where all boxes fill the square
+    scale = min(scale, resolution / max(float(size.max()), 1e-9))
     while True:
-        corner = _shelves(np.ceil(size * scale).astype(np.int64) + 2 * PADDING, resolution)
+        extent = np.maximum(size * scale, MINIMUM)
+        corner = _shelves(np.ceil(extent).astype(np.int64) + 2 * PADDING, resolution)
         if corner is not None:
-            return scale, corner
+            return extent, corner
+        if extent.max() <= MINIMUM:
+            raise ValueError(f"{len(size)} patches do not fit on {resolution}² texels")
         scale *= 0.95
 
 

@@ -17,11 +17,11 @@ from .shaders import ShaderReader, Surface
 from .values import ComputedTexture, Mapping, Unreadable, Value
 
 BAKE_UV = "_rtgi_bake"
-# Texels of a side of a baked texture, samples in each, and the polygons up to which a texture resolves more than corners do.
-RESOLUTION = 1024
+# Side of a baked texture by the number of polygons that share it; beyond the last, corners resolve as much as texels would.
+RESOLUTIONS = {1024: 512, 4096: 1024}
 SAMPLES = 4
-TEXTURE_POLYGONS = 16384
 _MARGIN = 2
+_MOST_UV_MAPS = 8
 _PLACEHOLDER = ComputedTexture("bake", np.ones((1, 1, 3), np.float32), False, "EXTEND")
 _MAPPING = Mapping(BAKE_UV)
 
@@ -85,11 +85,13 @@ def bake_leaves(request, leaves: dict[int, list[Leaf]], scene) -> tuple[dict[int
     Without a UV map the values are 1-row textures whose column is the loop index. Raises BakeError if Cycles cannot bake.
     """
     _require_cycles(request.name)
-    polygons = _polygons_of(request.mesh, leaves)
+    polygons = _polygons_of(request, leaves)
     uv = None
-    if np.count_nonzero(polygons) <= TEXTURE_POLYGONS and len(request.mesh.uv_layers) < 8:
-        uv = _unwrapped(request, polygons)
-    with _Stage(request, scene, uv) as stage:
+    count = np.count_nonzero(polygons)
+    resolution = next((side for most, side in RESOLUTIONS.items() if count <= most), 0)
+    if resolution and len(request.mesh.uv_layers) < _MOST_UV_MAPS:
+        uv = _unwrapped(request, polygons, resolution)
+    with _Stage(request, scene, uv, resolution) as stage:
         copies = {slot: stage.copy_of(slot) for slot in leaves}
         result = {slot: {} for slot in leaves}
         for kind in ("EMIT", "DIFFUSE"):
@@ -104,14 +106,14 @@ def bake_leaves(request, leaves: dict[int, list[Leaf]], scene) -> tuple[dict[int
     return result, uv
 
 
-def _polygons_of(mesh, slots) -> np.ndarray:
-    """(polygons,) bool: those whose material slot is among ``slots``."""
-    index = np.empty(len(mesh.polygons), np.int32)
-    mesh.polygons.foreach_get("material_index", index)
-    return np.isin(index, list(slots))
+def _polygons_of(request, slots) -> np.ndarray:
+    """(polygons,) bool: those whose material slot is among ``slots``; Blender takes the last slot for any beyond it."""
+    index = np.empty(len(request.mesh.polygons), np.int32)
+    request.mesh.polygons.foreach_get("material_index", index)
+    return np.isin(np.clip(index, 0, len(request.materials) - 1), list(slots))
 
 
-def _unwrapped(request, chosen: np.ndarray) -> np.ndarray:
+def _unwrapped(request, chosen: np.ndarray, resolution: int) -> np.ndarray:
     """(loops, 2) UV of the chosen polygons at the size they have in the world; the others shrink to a point."""
     mesh = request.mesh
     count = len(mesh.polygons)
@@ -129,7 +131,7 @@ def _unwrapped(request, chosen: np.ndarray) -> np.ndarray:
     uv = np.zeros((len(mesh.loops), 2), np.float32)
     if len(loops):
         uv[loops] = polygon_uv(points.reshape(-1, 3)[vertex[loops]] * scale, normals.reshape(-1, 3)[chosen],
-                               np.cumsum(kept) - kept, kept, RESOLUTION)
+                               np.cumsum(kept) - kept, kept, resolution)
     return uv
 
 
@@ -146,8 +148,8 @@ def _require_cycles(name: str) -> None:
 class _Stage:
     """A scene of its own with the object, its materials' copies and what to bake into; all gone on exit."""
 
-    def __init__(self, request, scene, uv: np.ndarray | None):
-        self._request, self._source, self._uv = request, scene, uv
+    def __init__(self, request, scene, uv: np.ndarray | None, resolution: int):
+        self._request, self._source, self._uv, self._resolution = request, scene, uv, resolution
         self._remove: list[tuple] = []
         self._images: dict[int, object] = {}
 
@@ -214,7 +216,7 @@ class _Stage:
     def copy_of(self, slot: int):
         """A copy of a slot's material, put in that slot, that ``expose`` may rewire."""
         copy = self._own(bpy.data.materials, self._request.materials[slot].copy())
-        self._add_target(copy, slot, RESOLUTION)
+        self._add_target(copy, slot, self._resolution)
         self._request.mesh.materials[slot] = copy
         return copy
 
@@ -274,7 +276,7 @@ class _Stage:
             pixels = pixels.reshape(1, -1, 4)
             counts = np.empty(len(self._request.mesh.polygons), np.int32)
             self._request.mesh.polygons.foreach_get("loop_total", counts)
-            filled = np.repeat(_polygons_of(self._request.mesh, [slot]), counts)[None]
+            filled = np.repeat(_polygons_of(self._request, [slot]), counts)[None]
         else:
             image = self._images[slot]
             pixels = np.empty(image.size[0] * image.size[1] * 4, np.float32)
@@ -284,7 +286,20 @@ class _Stage:
         seen = pixels[filled][:, :3]
         if len(seen) and np.ptp(seen, axis=0).max() <= 1e-5 * max(1.0, float(np.abs(seen).max())):
             return Value.of(seen.mean(axis=0, dtype=np.float64))
-        return Value(np.ones(3, np.float32), ComputedTexture(name, pixels[..., :3].copy(), False, "EXTEND"), mapping=_MAPPING)
+        rgb = pixels[..., :3].copy() if self._uv is None else filled_in(pixels[..., :3], filled)
+        return Value(np.ones(3, np.float32), ComputedTexture(name, rgb, False, "EXTEND"), mapping=_MAPPING)
+
+
+def filled_in(rgb: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """(side, side, 3) texels, the unknown ones from the mean of known ones nearby (the pull-push of Gortler et al. 1996):
+    thin polygons cover fewer texel centres than lookups reach. ``side`` is a power of two."""
+    if known.all() or len(rgb) == 1:
+        return rgb
+    half = len(rgb) // 2
+    count = known.reshape(half, 2, half, 2).sum(axis=(1, 3))
+    total = np.where(known[..., None], rgb, 0.0).reshape(half, 2, half, 2, 3).sum(axis=(1, 3))
+    coarse = filled_in((total / np.maximum(count, 1)[..., None]).astype(np.float32), count > 0)
+    return np.where(known[..., None], rgb, coarse.repeat(2, axis=0).repeat(2, axis=1))
 
 
 def _ensure_nodes(material) -> None:

@@ -12,6 +12,7 @@ from .values import Mapping, Unreadable, Value, apply
 
 # The name under which a mesh carries whichever colour attribute is active for render.
 ACTIVE_COLOR = "_rtgi_active_color"
+_MAXIMUM_DEPTH = 100
 
 
 class NodeReader:
@@ -25,6 +26,7 @@ class NodeReader:
         self._images = images
         self._attributes = attributes
         self._values: dict[tuple, Value] = {}
+        self._depth = 0
 
     def value(self, socket, path: tuple) -> Value:
         """What an input socket receives: a number (three equal components) for value sockets, else a colour or vector."""
@@ -38,7 +40,13 @@ class NodeReader:
         """``output``, evaluated once however many sockets it feeds."""
         key = (out.node.as_pointer(), out.identifier, tuple(node.as_pointer() for node in path))
         if key not in self._values:
-            self._values[key] = self.output(out, path)
+            if self._depth == _MAXIMUM_DEPTH:
+                raise Unreadable(out.node.label or out.node.name, f"more than {_MAXIMUM_DEPTH} nodes in a row")
+            self._depth += 1
+            try:
+                self._values[key] = self.output(out, path)
+            finally:
+                self._depth -= 1
         return self._values[key]
 
     def follow(self, socket, path: tuple):
