@@ -26,10 +26,10 @@ BIN = VENV / ("Scripts" if os.name == "nt" else "bin")
 PYTHON = BIN / ("python.exe" if os.name == "nt" else "python")
 
 IMPORT_ALL = """
-import importlib.util, OpenEXR, matplotlib, numpy, bpy
+import importlib.util, platform, OpenEXR, matplotlib, numpy, bpy
 if importlib.util.find_spec("embreex"):
     import embreex
-print(f"Blender {bpy.app.version_string}, numpy {numpy.__version__}")
+print(f"Blender {bpy.app.version_string}, Python {platform.python_version()}, numpy {numpy.__version__}")
 """
 
 
@@ -51,13 +51,17 @@ def write_stamp(content):
     os.replace(partial, STAMP)
 
 
-def is_ready(wanted):
-    """True if the environment was finished as ``wanted`` and its interpreter is still there. Without RTGI_PYTHON any will do."""
+def state(wanted):
+    """How far the environment has come: 'new', 'installed' (packages in, not yet seen to work) or 'ready'.
+
+    It counts only if it was made as ``wanted`` and its interpreter is still there; without RTGI_PYTHON any interpreter will do.
+    """
     try:
         stamp = json.loads(STAMP.read_text())
-        return PYTHON.exists() and stamp["requirements"] == wanted["requirements"] and wanted["forced"] in ("", stamp["forced"])
+        same = stamp["requirements"] == wanted["requirements"] and wanted["forced"] in ("", stamp["forced"])
+        return stamp["state"] if same and PYTHON.exists() else "new"
     except (OSError, ValueError, KeyError):
-        return False
+        return "new"
 
 
 def clear_folder():
@@ -75,8 +79,8 @@ def clear_folder():
             entry.unlink()
 
 
-def make_environment(wanted):
-    """Build the virtual environment from nothing. Raises SetupError."""
+def install(wanted):
+    """Build the virtual environment from nothing and fill it. Raises SetupError."""
     interpreter, version = find_interpreter(BIN)
     if VENV.exists():
         say(f"{VENV.name} is unfinished or out of date: making it anew")
@@ -90,13 +94,18 @@ def make_environment(wanted):
     pip = [str(PYTHON), "-m", "pip", "install", "--disable-pip-version-check", "--no-input", "--only-binary", ":all:"]
     if subprocess.run([*pip, "-r", str(REQUIREMENTS)]).returncode != 0:
         raise SetupError("pip failed on tools/requirements.txt (its message is above): check network and disk, then run again")
+    write_stamp({**wanted, "state": "installed"})
+
+
+def finish(wanted):
+    """Provide the system libraries that Blender needs, and see that everything can be imported. Raises SetupError."""
     for module in glob.glob(str(VENV / "lib" / "python*" / "site-packages" / "bpy" / "__init__*.so")):
         provide_libraries(module, str(PYTHON))
     imported = subprocess.run([str(PYTHON), "-I", "-c", IMPORT_ALL], capture_output=True, text=True)
     if imported.returncode != 0:
         raise SetupError(f"`import bpy` fails ({last_line(imported.stderr)}): provide what it names, then run again")
-    write_stamp(wanted)
-    say(f"ready: {last_line(imported.stdout)}, Python {version}")
+    write_stamp({**wanted, "state": "ready"})
+    say(f"ready: {last_line(imported.stdout)}")
 
 
 def main():
@@ -106,8 +115,10 @@ def main():
         held = lock()
         digest = hashlib.sha256(REQUIREMENTS.read_bytes()).hexdigest()
         wanted = {"requirements": digest, "forced": os.environ.get("RTGI_PYTHON", "")}
-        if not is_ready(wanted):
-            make_environment(wanted)
+        if state(wanted) == "new":
+            install(wanted)
+        if state(wanted) == "installed":
+            finish(wanted)
     except SetupError as error:
         print(f"setup: {error}", file=sys.stderr)
         return 1

@@ -45,7 +45,7 @@ def candidates(own_folder):
     if forced:
         found = shutil.which(forced)
         if found is None:
-            raise SetupError(f"RTGI_PYTHON ={forced} is no program: give the path of a Python {' or '.join(SUPPORTED)}")
+            raise SetupError(f"RTGI_PYTHON={forced} is no program: give the path of a Python {' or '.join(SUPPORTED)}")
         return [found]
     folders = os.environ.get("PATH", "").split(os.pathsep)
     for pattern in FOLDERS:
