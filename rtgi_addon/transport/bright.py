@@ -85,7 +85,7 @@ class BrightSurfaces:
         direction = towards / distance[:, None]
         cosine = -dot(self._normals[pick], direction)
         radiance = self._radiance[pick]
-        open_to = (cosine > 0) & (radiance.max(axis=1) > 0)
+        open_to = (cosine > 0) & (radiance[:, 0] + radiance[:, 1] + radiance[:, 2] > 0)
         if faces is not None:
             open_to &= dot(faces, direction) > 0
         rows = np.flatnonzero(open_to)

@@ -11,6 +11,7 @@ import numpy as np
 from .geometry import Geometry
 from .parallel import CHUNK, chunks, parallel_for
 from .surfaces import Surfaces
+from .vectors import dot
 
 try:
     from embreex import rtcore_scene
@@ -180,11 +181,12 @@ def offset_origins(points: np.ndarray, normals: np.ndarray, directions: np.ndarr
 
     The step is relative to the coordinates, and to ``reach`` (n,) where the points were computed as o + t·d: the distance t.
     """
-    scale = np.abs(points).max(axis=1)
+    # By component: reducing over an axis of three costs numpy several times as much.
+    scale = np.maximum(np.maximum(np.abs(points[:, 0]), np.abs(points[:, 1])), np.abs(points[:, 2]))
     if reach is not None:
         scale = np.maximum(scale, reach)
     step = scale * SELF_INTERSECTION
-    side = np.einsum("ij,ij->i", normals, directions)
+    side = dot(normals, directions)
     return points + normals * np.where(side >= 0, step, -step)[:, None].astype(np.float32)
 
 

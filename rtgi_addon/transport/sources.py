@@ -33,7 +33,7 @@ class Sources:
         """
         direction, distance, irradiance = self._sample(source, points, uv)
         cosine = dot(normals, direction)
-        lit = (cosine > 0) & (dot(geometric, direction) > 0) & (irradiance.max(axis=1) > 0)
+        lit = (cosine > 0) & (dot(geometric, direction) > 0) & (irradiance[:, 0] + irradiance[:, 1] + irradiance[:, 2] > 0)
         shadowed = lit & self.casts_shadow[source]
         rows = np.flatnonzero(shadowed)
         if rows.size:

@@ -30,22 +30,24 @@ WIDE_EMITTERS = 0.2
 # Emissive triangles are sampled this often from each texel.
 EMITTER_SAMPLES = 16
 # Rows that every batch of traced texels appends.
-_ROWS = ("irradiance_sky", "irradiance_emission", "irradiance_direct", "albedo", "choices", "choice_weights")
+_ROWS = ("irradiance_sky", "irradiance_emission", "irradiance_direct", "smooth", "choices", "choice_weights", "albedo")
 
 
 class SurfaceCache:
     """Irradiance per texel, from ``rays`` cosine rays and up to ``lamp_samples`` shadow rays per source for each.
 
     After ``reach`` and ``solve`` these arrays have a row per texel, and a last row of zeros for rays that left the scene (−1):
-    ``irradiance_rest`` (everything but the light of ``sources``), ``irradiance_direct`` (n + 1, 3) [W·m⁻²], ``albedo`` (n + 1, 3).
+    ``irradiance_rest`` (everything but the light of ``sources``), ``irradiance_direct`` (n + 1, 3) [W·m⁻²], ``albedo`` (n + 1, 3),
+    ``smooth`` (n + 1, 1) bool: direct light varies by less than ``smoothness`` (relative) over the texel, so its mean will do.
     """
 
     def __init__(self, context: LightContext, layout: TexelLayout, seed: int, rays: int = 64, lamp_samples: int = 8,
-                 max_texels: int = 1 << 20):
+                 smoothness: float = 0.1, max_texels: int = 1 << 20):
         self.context, self.layout, self.sources = context, layout, Sources(context)
         self.rays = max(RAYS_PER_POINT * 2, int(rays) // RAYS_PER_POINT * RAYS_PER_POINT)
         self.points = self.rays // RAYS_PER_POINT
         self.lamp_samples = min(int(lamp_samples), self.points)
+        self.smoothness = smoothness
         self._seed, self._max_texels = int(seed), max_texels
         self._sobol = sobol_owen(self.rays, 6, hash_u32(seed, 0x7E8E1))
         self.table = TexelTable(context, layout, lambda slots: self.numbers(slots, 0, 2, self.points), self.points)
@@ -54,6 +56,7 @@ class SurfaceCache:
         none = np.zeros((1, 3), np.float32)
         self.irradiance_sky = self.irradiance_emission = self.irradiance_direct = self.albedo = self.irradiance_rest = none
         self.choices, self.choice_weights = TexelLight.no_choices()
+        self.smooth = np.ones((1, 1), bool)
         self.bright: BrightSurfaces | None = None
         self._first_bounce, self._solved = none, 0
         emitters, areas = context.emitters, context.geometry.areas
@@ -111,13 +114,13 @@ class SurfaceCache:
                            ((primitive, seeds.primitive), (u, seeds.u), (v, seeds.v)))
         return self.surface_at(np.tile(slots, count), primitive, u, v)
 
-    def surface_at(self, slots: np.ndarray, primitive: np.ndarray, u: np.ndarray, v: np.ndarray):
-        """As ``surface``, for given points (m,) on ``slots`` (m,)."""
+    def surface_at(self, slots: np.ndarray, primitive: np.ndarray, u: np.ndarray, v: np.ndarray, points: np.ndarray | None = None):
+        """As ``surface``, for given points (m,) on ``slots`` (m,), whose positions (m, 3) may be known."""
         geometry, surfaces = self.context.geometry, self.context.surfaces
         side = np.where(slots & 1, np.float32(1), np.float32(-1))[:, None]
         face = geometry.normals_world[primitive] * side
         shading = surfaces.shading_normal(primitive, u, v) * side if surfaces.has_smooth_normals else face
-        return primitive, u, v, geometry.points(primitive, u, v), shading, face
+        return primitive, u, v, geometry.points(primitive, u, v) if points is None else points, shading, face
 
     def _trace(self, texels: np.ndarray):
         """One chunk: what the texels' rays hit, and what world, emission and lamps give the texels."""
@@ -140,8 +143,8 @@ class SurfaceCache:
             emission = self._emission_of_hits(surface_hits, found, density[found], n)
         if self.emitter_samples:
             emission = emission + self._sample_emitters(slots, surface)
-        direct, choices, weights = self._light.direct(texels, surface)
-        return (surface_hits, found, density.reshape(rays, n), sky, emission, direct, self._mean_albedo(surface, n), choices, weights)
+        return (surface_hits, found, density.reshape(rays, n), sky, emission, *self._light.direct(texels, surface),
+                self._mean_albedo(surface, n))
 
     def _directions(self, slots, shading) -> tuple[np.ndarray, np.ndarray]:
         local = cosine_hemisphere(self.numbers(slots, 2, 4, self.rays).reshape(-1, 2))
@@ -225,7 +228,7 @@ class SurfaceCache:
             return (sky, *other._light.direct(texels, surface))
 
         parts = parallel_for(work, len(ends), context.threads, progress, "direct light on the surface cache")
-        names = ("irradiance_sky", "irradiance_direct", "choices", "choice_weights")
+        names = ("irradiance_sky", "irradiance_direct", "smooth", "choices", "choice_weights")
         for column, name in enumerate(names):
             if column or world_changed:
                 rows = [part[column] for part in parts]

@@ -25,22 +25,28 @@ class TexelLight:
         return np.zeros((1, CHOICES), np.int16), np.zeros((1, CHOICES), np.float32)
 
     def direct(self, texels: np.ndarray, surface):
-        """Mean direct irradiance (n, 3) over the first points of ``surface``, and the texels' choices (n, CHOICES): source index
-        and one over its probability; zeros where all sources are sampled anyway."""
+        """Mean direct irradiance (n, 3) over the first points of ``surface``; whether it is ``smooth`` (n, 1) bool, that is, varies
+        by less than the cache's ``smoothness`` between them; and the texels' choices (n, CHOICES): source index and one over its
+        probability; zeros where all sources are sampled anyway."""
         slots = self._cache.table.slots[texels]
         n, samples, sources = len(slots), self._cache.lamp_samples, self._sources.count
         result = np.zeros((n, 3), np.float32)
         choices, weights = (np.zeros((n, CHOICES), table.dtype) for table in self.no_choices())
         if sources == 0:
-            return result, choices, weights
+            return result, np.ones((n, 1), bool), choices, weights
         points, shading, face = (part[: samples * n] for part in surface[3:])
         uv = self._cache.numbers(slots, 4, 6, samples).reshape(-1, 2)
         reach = np.zeros(len(points), np.float32)
         if sources <= ALL_SOURCES:
-            for source in range(sources):
-                light = self._sources.irradiance(source, points, shading, face, reach, uv)
-                result += light.reshape(samples, n, 3).mean(axis=0)
-            return result, choices, weights
+            light = self._sources.irradiance(0, points, shading, face, reach, uv)
+            for source in range(1, sources):
+                light += self._sources.irradiance(source, points, shading, face, reach, uv)
+            light = light.reshape(samples, n, 3)
+            mean = light.mean(axis=0)
+            # Dark throughout counts as smooth: the chance of missing a sliver of light equals that of missing one of shadow.
+            spread = np.square(light - mean).mean(axis=0).sum(axis=1)
+            smooth = spread <= self._cache.smoothness**2 * np.square(mean).sum(axis=1)
+            return mean, smooth[:, None], choices, weights
         choices, weights = self._choose(slots, points[:n], shading[:n])
         passes = -(-CHOICES // samples)
         for number in range(passes):
@@ -48,7 +54,7 @@ class TexelLight:
             light = self._sources.irradiance(choices[:, column].T.reshape(-1).astype(np.int64), points, shading, face, reach, uv)
             light *= weights[:, column].T.reshape(-1, 1) / np.float32(passes)
             result += light.reshape(samples, n, 3).mean(axis=0)
-        return result, choices, weights
+        return result, np.zeros((n, 1), bool), choices, weights
 
     def radiance_at(self, slots, primitive, u, v, uv):
         """Radiance (m, 3) that the sources' light leaves at points of slots by reflection, and their points and face normals."""

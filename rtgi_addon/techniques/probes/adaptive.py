@@ -12,7 +12,7 @@ SLOPE = 0.7
 # One probe's difference is one sample of its error: lean on the mean of its neighbours by this share.
 POOLED = 0.5
 # Share of the target left to the sampling of probe rays; the rest is for the surface cache.
-SAMPLING_SHARE = 0.95
+SAMPLING_SHARE = 0.85
 # A round goes this share of the way that the last estimate asks for, so that an overestimate is noticed before it is paid for.
 STRIDE = 0.7
 
@@ -77,9 +77,7 @@ class ErrorModel:
 
 
 def ladder(rays: np.ndarray, highest: int) -> np.ndarray:
-    """The least number of rays not below ``rays`` (m,) among FIRST_ROUND·2^k and 1.5 times those, at most ``highest``: few enough
-    different numbers that neighbouring probes can share their work."""
-    octave = np.floor(np.log2(np.maximum(rays, FIRST_ROUND) / FIRST_ROUND))
-    base = FIRST_ROUND * 2.0**octave
-    rung = np.where(rays <= base, base, np.where(rays <= 1.5 * base, 1.5 * base, 2.0 * base))
-    return np.minimum(rung, highest).astype(np.int64)
+    """The least number of rays not below ``rays`` (m,) on a ladder of four even rungs an octave from FIRST_ROUND up, at most
+    ``highest``: few enough different numbers that neighbouring probes can share their work."""
+    rung = FIRST_ROUND / 4.0 * 2.0 ** np.floor(np.log2(np.maximum(rays, FIRST_ROUND) / FIRST_ROUND))
+    return np.minimum(np.ceil(rays / rung) * rung, highest).astype(np.int64)

@@ -25,6 +25,8 @@ ITEM_RAYS, BATCH_RAYS = 1 << 16, 1 << 22
 # Texels that the surfaces around the probes are divided into at 1 % error; the number grows as the error falls.
 TEXELS = 6000
 CACHE_RAYS = 64
+# Direct light that varies by less than this over a texel is taken from the texel, at 1 % error.
+SMOOTHNESS = 0.1
 
 
 class ProbeBake:
@@ -45,7 +47,7 @@ class ProbeBake:
         size = settings.texel_size or texel_size(context, volumes, TEXELS / refine)
         layout = TexelLayout(context.geometry, Focus(*focus(volumes), size))
         rays = settings.cache_rays or int(np.clip(CACHE_RAYS * 2 ** round(np.log2(1.0 / refine)), 16, 1024))
-        self.cache = SurfaceCache(context, layout, seed, rays)
+        self.cache = SurfaceCache(context, layout, seed, rays, smoothness=float(np.clip(SMOOTHNESS * refine, 0.01, 0.2)))
         self.gatherer = Gatherer(context, self.cache, self.placement, settings, seed)
         count = len(self.placement.positions)
         self.model = ErrorModel(count, sh.coefficient_count(settings.order))

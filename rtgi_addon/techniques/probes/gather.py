@@ -22,9 +22,11 @@ GROUP = 8
 RAYS_PER_LIGHT_SAMPLE = 8
 # Samples of each lamp that has an extent, where its direct light is wanted.
 LAMP_SAMPLES = 64
-# Sharpness of the cosine-power filter that spreads ray distances over a visibility tile: Majercik et al. 2019 use 50 for
-# few rays a frame; three times that leaks half as much light past thin walls.
-_VISIBILITY_SHARPNESS = 150.0
+# Distances are averaged over this many rays of each probe, rounded up to whole items: sharper than a tile resolves.
+VISIBILITY_RAYS = 512
+# Ray distances are spread over a visibility tile by cos^(2^this): Majercik et al. 2019 use cos^50 for few rays a frame; 128 leaks
+# half as much light past thin walls.
+_VISIBILITY_SQUARINGS = 7
 _UNIFORM_PDF = np.float32(1.0 / (4.0 * np.pi))
 
 
@@ -73,8 +75,8 @@ class Gathered:
     sh: np.ndarray
     emitted: np.ndarray | None
     albedo: np.ndarray | None
-    distance: np.ndarray
-    distance_weight: np.ndarray
+    distance: np.ndarray | np.float32
+    distance_weight: np.ndarray | np.float32
 
 
 class Gatherer:
@@ -184,32 +186,37 @@ class Gatherer:
         return _UNIFORM_PDF * cosine / np.maximum(traced.t[rows] ** 2, np.float32(1e-20))
 
     def _direct(self, item: Item, traced: Traced, texel: np.ndarray) -> np.ndarray:
-        """Irradiance (h, 3) of lamps and bright sky at hits: one shadow ray for each of a few sources, or for one chosen; less what
-        is sampled as a bright surface."""
-        cache, hits, rows = self._cache, traced.surface, traced.rows
-        points = np.take(traced.directions, rows // item.shape[2], axis=0) * traced.t[:, None]
-        points += self._placement.positions[item.probe_of(rows)]
-        side = np.where(hits.slots & 1, np.float32(1), np.float32(-1))[:, None]
-        face = self._context.geometry.normals_world[hits.primitive] * side
-        surfaces = self._context.surfaces
-        shading = surfaces.shading_normal(hits.primitive, hits.u, hits.v) * side if surfaces.has_smooth_normals else face
-        if cache.sources.count <= ALL_SOURCES:
-            numbers = None if cache.sources.is_delta.all() else self._shifted(item, 2, 4)[rows]
-            total = np.zeros((len(rows), 3), np.float32)
-            for source in range(cache.sources.count):
-                uv = np.zeros((len(rows), 2), np.float32) if cache.sources.is_delta[source] else _turn(numbers, source)
-                total += cache.sources.irradiance(source, points, shading, face, traced.t, uv)
-        else:
-            numbers = self._shifted(item, 2, 5)[rows]
-            column = np.minimum((numbers[:, 2] * CHOICES).astype(np.int64), CHOICES - 1)
-            source, weight = cache.choices[texel, column], cache.choice_weights[texel, column]
-            total = cache.sources.irradiance(source.astype(np.int64), points, shading, face, traced.t, numbers[:, :2]) * weight[:, None]
+        """Irradiance (h, 3) of lamps and bright sky at hits, less what is sampled as a bright surface: the texel's mean where that
+        is smooth, shadow rays from the hit elsewhere."""
+        cache = self._cache
+        total = np.take(cache.irradiance_direct, texel, axis=0, mode="wrap")
+        uneven = np.flatnonzero(~np.take(cache.smooth[:, 0], texel, mode="wrap"))
+        if uneven.size:
+            total[uneven] = self._direct_at(item, traced, texel, uneven)
         if cache.bright.count:
             pdf = np.take(cache.bright.pdf_area, texel, mode="wrap")
             found = np.flatnonzero(pdf)
             density = self._density(item, traced, found)
             total[found] *= (density / np.maximum(density + pdf[found] / RAYS_PER_LIGHT_SAMPLE, 1e-30))[:, None]
         return total
+
+    def _direct_at(self, item: Item, traced: Traced, texel: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+        """One shadow ray from each of the ``chosen`` (c,) hits to each of a few sources, or to one picked from the texel's."""
+        cache, hits, rows, t = self._cache, traced.surface.take(chosen), traced.rows[chosen], traced.t[chosen]
+        points = np.take(traced.directions, rows // item.shape[2], axis=0) * t[:, None]
+        points += self._placement.positions[item.probe_of(rows)]
+        _, _, _, _, shading, face = cache.surface_at(hits.slots, hits.primitive, hits.u, hits.v, points)
+        if cache.sources.count <= ALL_SOURCES:
+            numbers = None if cache.sources.is_delta.all() else self._shifted(item, 2, 4)[rows]
+            total = np.zeros((len(rows), 3), np.float32)
+            for source in range(cache.sources.count):
+                uv = np.zeros((len(rows), 2), np.float32) if cache.sources.is_delta[source] else _turn(numbers, source)
+                total += cache.sources.irradiance(source, points, shading, face, t, uv)
+            return total
+        numbers = self._shifted(item, 2, 5)[rows]
+        column = np.minimum((numbers[:, 2] * CHOICES).astype(np.int64), CHOICES - 1)
+        source, weight = cache.choices[texel[chosen], column], cache.choice_weights[texel[chosen], column]
+        return cache.sources.irradiance(source.astype(np.int64), points, shading, face, t, numbers[:, :2]) * weight[:, None]
 
     def _shifted(self, item: Item, first: int, last: int) -> np.ndarray:
         """(g·n·m, last − first): the sequences' further dimensions, shifted on the torus for each probe by a hash."""
@@ -282,12 +289,14 @@ class Gatherer:
 
     def _visibility(self, item: Item, traced: Traced) -> tuple[np.ndarray, np.ndarray]:
         g, n, m = item.shape
+        if item.first >= VISIBILITY_RAYS:
+            return np.float32(0), np.float32(0)
         t = np.full(item.ray_count, np.inf, np.float32)
         t[traced.rows] = traced.t
         t = np.minimum(t.reshape(g, n, m), self._placement.reach[item.probes][:, None])
-        # A power of the cosine through its logarithm is half the cost of the power itself.
-        cosine = np.maximum(traced.directions @ self._tile_directions.T, np.float32(1e-20))
-        weight = np.exp(np.float32(_VISIBILITY_SHARPNESS) * np.log(cosine)).reshape(g, n, -1)
+        weight = np.maximum(traced.directions @ self._tile_directions.T, 0).reshape(g, n, -1)
+        for _ in range(_VISIBILITY_SQUARINGS):
+            weight *= weight
         both = np.concatenate([t, t * t], axis=2)
         sums = np.matmul(weight.transpose(0, 2, 1), both).reshape(g, -1, 2, m)
         return sums.transpose(0, 3, 1, 2), weight.sum(axis=1)[:, None, :]
