@@ -7,6 +7,7 @@ corner attributes. The user's scene, selection and materials are never touched; 
 
 from dataclasses import dataclass
 
+import addon_utils
 import bpy
 import numpy as np
 
@@ -136,8 +137,6 @@ def _unwrapped(request, chosen: np.ndarray, resolution: int) -> np.ndarray:
 
 
 def _require_cycles(name: str) -> None:
-    import addon_utils
-
     if not hasattr(bpy.types.Scene, "cycles"):
         addon_utils.enable("cycles")
     if not hasattr(bpy.types.Scene, "cycles"):
