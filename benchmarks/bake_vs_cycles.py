@@ -60,8 +60,8 @@ def even_resolution(probes: int, size: np.ndarray) -> tuple[int, int, int]:
     return min(factors, key=lambda counts: float(np.ptp(np.log(size / np.array(counts)))))
 
 
-def reference(name: str, probes: int, seconds: float, threads: int | None) -> dict:
-    """Flat lattice indices, SH and variance at points in the open; rendered once, then kept in benchmarks/results."""
+def reference(name: str, probes: int, seconds: float, threads: int | None, keep: bool) -> dict:
+    """Flat lattice indices, SH and variance at points in the open; with ``keep`` stored in benchmarks/results for later runs."""
     path = RESULTS / f"reference_{name}_{probes}.npz"
     volume = open_sample(name, probes)
     lattice = volume_points(bpy.context.scene)
@@ -84,7 +84,8 @@ def reference(name: str, probes: int, seconds: float, threads: int | None) -> di
         if variance.sum() <= 0.0015**2 * np.square(mean).sum():
             break
     known = {"index": index, "sh": mean, "variance": variance, "points_world": lattice[index]}
-    np.savez_compressed(path, **known)
+    if keep:
+        np.savez_compressed(path, **known)
     return known
 
 
@@ -142,7 +143,7 @@ def seconds_at(points: list[dict], error: float) -> tuple[float, str]:
 def compare(name: str, probes: int, options, say) -> dict:
     """Both curves for one sample and lattice."""
     say(f"{name}, {probes} probes: reference")
-    known = reference(name, probes, options.reference_seconds, options.threads)
+    known = reference(name, probes, options.reference_seconds, options.threads, not options.quick)
     ours, cycles = [], []
     bake_errors, cycles_samples = list(BAKE_ERRORS), list(CYCLES_SAMPLES)
     if options.quick:
