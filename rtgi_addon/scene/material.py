@@ -10,7 +10,8 @@ class Texture:
     """An image sampled by UV.
 
     ``pixels`` is (height, width, channels) with row 0 at v = 0 (Blender's bottom-up order), channels 1, 3 or 4, dtype uint8
-    or float32. ``srgb`` says that RGB is sRGB-encoded (it is decoded before filtering; alpha never is).
+    or float32. ``srgb`` says that RGB is sRGB-encoded: texels are filtered as they are stored and the result is decoded, as in
+    Cycles; alpha never is.
     ``extension`` is 'REPEAT', 'EXTEND', 'CLIP' or 'MIRROR'; ``interpolation`` is 'Linear' or 'Closest': Blender's own words.
     """
 

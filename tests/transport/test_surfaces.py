@@ -67,15 +67,33 @@ def test_closest_takes_one_texel():
     np.testing.assert_allclose(value[:, :2] * 8, [[1, 0], [2, 1]])
 
 
-def test_srgb_bytes_are_decoded_before_filtering_and_alpha_is_not():
+def decoded(code):
+    """The sRGB transfer function (IEC 61966-2-1)."""
+    return np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
+
+
+def test_srgb_bytes_are_filtered_as_stored_and_then_decoded_but_alpha_is_not():
+    """Half way between black and code 188 Cycles reads decode(94), not half of decode(188)."""
     pixels = np.zeros((1, 2, 4), np.uint8)
     pixels[0, 1] = 255, 188, 0, 188
     texture = Texture("t", pixels, srgb=True)
     middle = np.array([[0.5, 0.5]], np.float32)
-    linear = ((188 / 255 + 0.055) / 1.055) ** 2.4
-    np.testing.assert_allclose(sample_texture(texture, middle), [[0.5, 0.5 * linear, 0]], atol=1e-5)
-    np.testing.assert_allclose(sample_texture(texture, middle, "a")[:, 0], 0.5 * 188 / 255, atol=1e-5)
-    np.testing.assert_allclose(sample_texture(Texture("t", pixels), middle)[0, 1], 0.5 * 188 / 255, atol=1e-5)
+    expected = decoded(np.array([127.5, 94.0, 0.0]) / 255)
+    np.testing.assert_allclose(sample_texture(texture, middle), [expected], atol=1e-6)
+    np.testing.assert_allclose(sample_texture(texture, middle, "g"), [expected[[1, 1, 1]]], atol=1e-6)
+    np.testing.assert_allclose(sample_texture(texture, middle, "a")[:, 0], 0.5 * 188 / 255, atol=1e-6)
+    np.testing.assert_allclose(sample_texture(Texture("t", pixels), middle)[0, 1], 0.5 * 188 / 255, atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.float32])
+@pytest.mark.parametrize("interpolation", ["Linear", "Closest"])
+def test_every_srgb_code_is_decoded_at_its_texels_centre(kind, interpolation):
+    codes = np.arange(256, dtype=np.uint8).reshape(1, 256, 1)
+    pixels = codes if kind is np.uint8 else (codes / 255).astype(np.float32)
+    uv = np.stack([(np.arange(256) + 0.5) / 256, np.full(256, 0.5)], axis=1).astype(np.float32)
+    value = sample_texture(Texture("t", pixels, srgb=True, interpolation=interpolation), uv)
+    np.testing.assert_allclose(value, np.repeat(decoded(np.arange(256) / 255)[:, None], 3, axis=1), atol=3e-6)
+    assert value.dtype == np.float32
 
 
 def test_a_channel_is_constant_times_texture_times_attribute_plus_offset():
