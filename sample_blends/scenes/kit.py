@@ -17,8 +17,13 @@ BOX_FACES = {
 def reset(name: str) -> bpy.types.Scene:
     """Empty the file and return its scene, set up for Cycles on the CPU with a black world and the Standard view."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
+    for screen in bpy.data.screens:  # a file selector remembers the home folder of whoever builds the file
+        for space in (space for area in screen.areas for space in area.spaces if space.type == "FILE_BROWSER"):
+            if space.params is not None:
+                space.params.directory = b"//"
     scene = bpy.context.scene
     scene.name = name
+    scene.render.filepath = "//"
     scene.unit_settings.system = "METRIC"
     scene.render.engine = "CYCLES"
     scene.render.resolution_x, scene.render.resolution_y = 640, 360

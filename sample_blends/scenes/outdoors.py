@@ -57,10 +57,10 @@ def outdoor_hdri():
     """Objects on open ground under a photographed sunset (a CC0 studio light that ships with Blender), turned by 40 degrees:
     one bright patch in the surroundings gives most of the light."""
     folder = Path(bpy.utils.system_resource("DATAFILES", path="studiolights/world"))
-    image = bpy.data.images.load(str(folder / "sunset.exr"))
-    image.pack()
-    # A relative path: the packed copy is the picture, and the maker's folders are nobody's business.
-    image.filepath = image.filepath_raw = "//sunset.exr"
+    content = (folder / "sunset.exr").read_bytes()
+    image = bpy.data.images.new("sunset.exr", 8, 8, float_buffer=True)
+    image.source, image.filepath = "FILE", "//sunset.exr"  # loading it would keep the path of whoever builds the file
+    image.pack(data=content, data_len=len(content))
     kit.world_image(bpy.context.scene, image, 1.0, math.radians(40.0))
     kit.box("Ground", (-8, -8, -0.5), (8, 8, 0.0), kit.material("Sand", (0.5, 0.42, 0.32)))
     clay = kit.material("Clay", (0.65, 0.3, 0.2), shader="diffuse")
