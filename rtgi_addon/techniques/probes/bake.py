@@ -5,7 +5,7 @@ import time
 import numpy as np
 
 from ...errors import BakeError
-from ...numerics import sh
+from ...numerics import octahedral, sh
 from ...numerics.grid import cell_size
 from ...progress import Progress
 from ...scene import ProbeVolume
@@ -20,6 +20,8 @@ from .placement import Placement, place
 from .relight import HitMemory
 from .settings import ProbeSettings
 
+# Rays of a probe in one block: a multiple of what light samples come with, and a divisor of the first round.
+BLOCK_RAYS = 64
 # Rays of one work item, and of all the items that are held in memory between tracing and shading.
 ITEM_RAYS, BATCH_RAYS = 1 << 16, 1 << 22
 # Texels that the surfaces around the probes are divided into at 1 % error; the number grows as the error falls.
@@ -125,21 +127,25 @@ class ProbeBake:
         return np.unique(probes // GROUP, return_inverse=True)[1].reshape(-1)
 
     def _items(self) -> list[Item]:
-        """The rays of this round cut into items: groups with equally many probes that have the same first and last ray."""
-        items, before = [], self.model.rays
-        probes = np.flatnonzero(self._goal > before)
-        key = np.stack([probes // GROUP, before[probes], self._goal[probes]], axis=1)
-        distinct, which, sizes = np.unique(key, axis=0, return_inverse=True, return_counts=True)
-        members = np.split(probes[np.argsort(which.reshape(-1), kind="stable")], np.cumsum(sizes)[:-1])
-        for first, last, size in np.unique(np.column_stack([distinct[:, 1:], sizes]), axis=0).tolist():
-            alike = np.flatnonzero((distinct[:, 1:] == (first, last)).all(axis=1) & (sizes == size))
-            step = max(RAYS_PER_LIGHT_SAMPLE, ITEM_RAYS // size // RAYS_PER_LIGHT_SAMPLE * RAYS_PER_LIGHT_SAMPLE)
-            for start in range(first, last, step):
-                stop = min(start + step, last)
-                count = max(1, ITEM_RAYS // (size * (stop - start)))
-                for begin in range(0, len(alike), count):
-                    chosen = alike[begin:begin + count]
-                    items.append(Item(distinct[chosen, 0], np.stack([members[row] for row in chosen]), start, stop))
+        """The rays of this round in blocks of up to BLOCK_RAYS a probe, gathered into items of blocks of one shape."""
+        before, goal = self.model.rays, self._goal
+        probes = np.flatnonzero(goal > before)
+        key = np.stack([probes // GROUP, before[probes], goal[probes]], axis=1)
+        key, which, sizes = np.unique(key, axis=0, return_inverse=True, return_counts=True)
+        which = which.reshape(-1)
+        order = np.argsort(which, kind="stable")
+        members = np.zeros((len(key), GROUP), np.int64)
+        members[which[order], np.arange(len(order)) - np.repeat(np.cumsum(sizes) - sizes, sizes)] = probes[order]
+        blocks = -(-(key[:, 2] - key[:, 1]) // BLOCK_RAYS)
+        of_key = np.repeat(np.arange(len(key)), blocks)
+        first = key[of_key, 1] + BLOCK_RAYS * (np.arange(len(of_key)) - np.repeat(np.cumsum(blocks) - blocks, blocks))
+        count = np.minimum(BLOCK_RAYS, key[of_key, 2] - first)
+        items = []
+        for rays, size in np.unique(np.stack([count, sizes[of_key]], axis=1), axis=0).tolist():
+            alike = np.flatnonzero((count == rays) & (sizes[of_key] == size))
+            step = max(1, ITEM_RAYS // (rays * size))
+            for chunk in (alike[i:i + step] for i in range(0, len(alike), step)):
+                items.append(Item(key[of_key[chunk], 0], members[of_key[chunk], :size], first[chunk], rays))
         return items
 
     def _trace_round(self) -> None:
@@ -170,12 +176,12 @@ class ProbeBake:
         gathered = parallel_for(lambda i: self.gatherer.shade(batch[i], traced[i], texels[i]), len(batch), threads,
                                 progress.span(0.6, 1.0), label)
         for item, hits, texel, one in zip(batch, traced, texels, gathered, strict=True):
-            self._sums[item.probes] += one.sh
-            self._distance[item.probes] += one.distance
-            self._distance_weight[item.probes] += one.distance_weight
+            self._sums[one.probes] += one.sh
+            self._distance[one.probes] += one.distance
+            self._distance_weight[one.probes] += one.distance_weight
             self.memory.keep(item, hits, texel, one)
             if one.emitted is not None:
-                self.emitted[item.probes] += one.emitted
+                self.emitted[one.probes] += one.emitted
 
     def _state(self) -> dict[str, np.ndarray]:
         arrays = {f"cache.{name}": value for name, value in self.cache.state().items()}
@@ -209,7 +215,7 @@ class ProbeBake:
     def cut(self, coefficients: np.ndarray, error: np.ndarray) -> tuple[ProbeGrid, ...]:
         """Grids of the volumes from ``coefficients`` (p, k, 3) and ``error`` (p,) of all probes."""
         side = self.settings.visibility_resolution
-        visibility = self._distance / np.maximum(self._distance_weight, 1e-30)[:, :, None]
+        visibility = self._visibility()
         result, start = [], 0
         for volume in self.volumes:
             shape = tuple(reversed(volume.resolution))
@@ -220,6 +226,14 @@ class ProbeBake:
                 visibility[span].reshape(*shape, side, side, 2), self.placement.offset[span].reshape(*shape, 3),
                 error[span].reshape(shape)))
         return tuple(result)
+
+    def _visibility(self) -> np.ndarray:
+        """Mean and mean squared distance (p, T², 2); a cell that no ray fell into takes a mean of the cells around it."""
+        directions = octahedral.texel_directions(self.settings.visibility_resolution).reshape(-1, 3)
+        around = (np.maximum(directions @ directions.T, 0) ** 64 * 1e-4).astype(np.float32)
+        weight = self._distance_weight + self._distance_weight @ around
+        sums = self._distance + np.einsum("tu,puc->ptc", around, self._distance)
+        return sums / np.maximum(weight, 1e-30)[:, :, None]
 
 
 def focus(volumes: tuple[ProbeVolume, ...]) -> tuple[np.ndarray, float]:

@@ -22,33 +22,31 @@ GROUP = 8
 RAYS_PER_LIGHT_SAMPLE = 8
 # Samples of each lamp that has an extent, where its direct light is wanted.
 LAMP_SAMPLES = 64
-# Distances are averaged over this many rays of each probe, rounded up to whole items: sharper than a tile resolves.
-VISIBILITY_RAYS = 512
-# Ray distances are spread over a visibility tile by cos^(2^this): Majercik et al. 2019 use cos^50 for few rays a frame; 128 leaks
-# half as much light past thin walls.
-_VISIBILITY_SQUARINGS = 7
+# Distances are averaged over this many rays of each probe: with 64 cells to a tile, as many as tell.
+VISIBILITY_RAYS = 1024
 _UNIFORM_PDF = np.float32(1.0 / (4.0 * np.pi))
 
 
 @dataclass(frozen=True, eq=False)
 class Item:
-    """Rays ``first`` … ``last`` − 1 of the sequences of some ``groups`` (g,), each for as many of its probes: ``probes`` (g, m).
-    Both ends are multiples of RAYS_PER_LIGHT_SAMPLE. Its rays are ordered group by group, direction by direction: (g, n, m)."""
+    """Blocks of ``count`` rays of some ``groups`` (g,), from ray ``first`` (g,) of each group's sequence, for as many of its probes:
+    ``probes`` (g, m). ``first`` and ``count`` are multiples of RAYS_PER_LIGHT_SAMPLE; a group may occur with several blocks. Rays
+    are ordered block by block, direction by direction: (g, n, m) with n = ``count``."""
 
     groups: np.ndarray
     probes: np.ndarray
-    first: int
-    last: int
+    first: np.ndarray
+    count: int
 
     @property
     def shape(self) -> tuple[int, int, int]:
         """(g, n, m)."""
-        return len(self.groups), self.last - self.first, self.probes.shape[1]
+        return len(self.groups), self.count, self.probes.shape[1]
 
     @property
     def ray_count(self) -> int:
         """Rays in the item."""
-        return self.probes.size * (self.last - self.first)
+        return self.probes.size * self.count
 
     def probe_of(self, rows: np.ndarray) -> np.ndarray:
         """The probe (h,) that each of the rays ``rows`` (h,) leaves from."""
@@ -68,15 +66,17 @@ class Traced:
 
 @dataclass(eq=False)
 class Gathered:
-    """An item's sums: ``sh`` (g, m, k, 3) the sum over its rays of 4π·L·Y (divide by the number of rays), ``emitted`` what of it is
-    light from emissive surfaces (None where nothing emits), ``albedo`` (h, 3) at the hits (None where it is each triangle's own),
-    and for visibility the weighted sums (T², m, 2) of distance and squared distance with their weights (T²,)."""
+    """An item's sums over the blocks of the same ``probes`` (b, m): ``sh`` (b, m, k, 3) the sum over rays of 4π·L·Y (divide by the
+    number of rays), ``emitted`` what of it is light from emissive surfaces (None where nothing emits), ``albedo`` (h, 3) at the
+    hits (None where it is each triangle's own), and for visibility the sums (b, m, T², 2) of distance and squared distance over
+    the rays in each cell of the tile, with their numbers (b, 1, T²)."""
 
+    probes: np.ndarray
     sh: np.ndarray
     emitted: np.ndarray | None
     albedo: np.ndarray | None
-    distance: np.ndarray | np.float32
-    distance_weight: np.ndarray | np.float32
+    distance: np.ndarray
+    distance_weight: np.ndarray
 
 
 class Gatherer:
@@ -86,7 +86,6 @@ class Gatherer:
         self._context, self._cache, self._placement, self._seed = context, cache, placement, seed
         self._order, self._resolution = settings.order, settings.visibility_resolution
         self._bounces = settings.bounces
-        self._tile_directions = octahedral.texel_directions(self._resolution).reshape(-1, 3).astype(np.float32)
         self._albedo = context.surfaces.albedo_by_triangle()
         emitters = context.emitters
         self._sample_emitters = emitters.count > 0 and cache.emitter_samples > 0
@@ -119,12 +118,12 @@ class Gatherer:
 
     def _numbers(self, item: Item, last: int, first: int = 0) -> np.ndarray:
         """Dimensions ``first`` … ``last`` − 1 of the groups' sequences: (g, n, last − first)."""
-        index = np.arange(item.first, item.last, dtype=np.uint32)
+        index = item.first[:, None] + np.arange(item.count)
         return sobol_owen_at(index, last, hash_u32(self._seed, item.groups)[:, None])[..., first:]
 
     def _light_numbers(self, item: Item, dimensions: int, purpose: int) -> np.ndarray:
         """(g, n / RAYS_PER_LIGHT_SAMPLE, dimensions) for samples of one kind of light, in step with the rays."""
-        index = np.arange(item.first // RAYS_PER_LIGHT_SAMPLE, item.last // RAYS_PER_LIGHT_SAMPLE, dtype=np.uint32)
+        index = item.first[:, None] // RAYS_PER_LIGHT_SAMPLE + np.arange(item.count // RAYS_PER_LIGHT_SAMPLE)
         return sobol_owen_at(index, dimensions, hash_u32(self._seed, item.groups, purpose)[:, None])
 
     def shade(self, item: Item, traced: Traced, texel: np.ndarray | None) -> Gathered:
@@ -145,7 +144,14 @@ class Gatherer:
             radiance.reshape(-1, 3)[traced.rows] = self._emitted(item, traced)
             emitted = project(basis, radiance) * np.float32(4.0 * np.pi) + self._emitter_samples(item)
             total = total + emitted
-        return Gathered(total, emitted, albedo, *self._visibility(item, traced))
+        # Blocks of the same probes follow one another.
+        first = np.flatnonzero(np.append(True, (np.diff(item.groups) != 0) | (np.diff(item.probes[:, 0]) != 0)))
+
+        def merged(part):
+            return np.add.reduceat(part, first, axis=0)
+
+        return Gathered(item.probes[first], merged(total), None if emitted is None else merged(emitted), albedo,
+                        *(merged(part) for part in self._visibility(item, traced)))
 
     def basis(self, item: Item, directions: np.ndarray) -> np.ndarray:
         """SH basis (g, n, k) of directions (g·n, 3)."""
@@ -207,22 +213,24 @@ class Gatherer:
         points += self._placement.positions[item.probe_of(rows)]
         _, _, _, _, shading, face = cache.surface_at(hits.slots, hits.primitive, hits.u, hits.v, points)
         if cache.sources.count <= ALL_SOURCES:
-            numbers = None if cache.sources.is_delta.all() else self._shifted(item, 2, 4)[rows]
+            numbers = None if cache.sources.is_delta.all() else self._shifted(item, rows, 2, 4)
             total = np.zeros((len(rows), 3), np.float32)
             for source in range(cache.sources.count):
                 uv = np.zeros((len(rows), 2), np.float32) if cache.sources.is_delta[source] else _turn(numbers, source)
                 total += cache.sources.irradiance(source, points, shading, face, t, uv)
             return total
-        numbers = self._shifted(item, 2, 5)[rows]
+        numbers = self._shifted(item, rows, 2, 5)
         column = np.minimum((numbers[:, 2] * CHOICES).astype(np.int64), CHOICES - 1)
         source, weight = cache.choices[texel[chosen], column], cache.choice_weights[texel[chosen], column]
         return cache.sources.irradiance(source.astype(np.int64), points, shading, face, t, numbers[:, :2]) * weight[:, None]
 
-    def _shifted(self, item: Item, first: int, last: int) -> np.ndarray:
-        """(g·n·m, last − first): the sequences' further dimensions, shifted on the torus for each probe by a hash."""
-        shift = np.stack([_fraction(hash_u32(item.probes, d, self._seed, 17)) for d in range(first, last)], axis=-1)
-        numbers = self._numbers(item, last, first)[:, :, None] + shift[:, None]
-        return (numbers - np.floor(numbers)).reshape(-1, last - first)
+    def _shifted(self, item: Item, rows: np.ndarray, first: int, last: int) -> np.ndarray:
+        """(h, last − first): the sequences' further dimensions for the rays ``rows`` (h,), shifted on the torus for each probe."""
+        probes = item.probe_of(rows)
+        numbers = np.take(self._numbers(item, last, first).reshape(-1, last - first), rows // item.shape[2], axis=0)
+        for d in range(first, last):
+            numbers[:, d - first] += np.take(_fraction(hash_u32(np.arange(len(self._placement.positions)), d, self._seed, 17)), probes)
+        return numbers - np.floor(numbers)
 
     def _light_samples(self, item: Item, reflected: bool) -> np.ndarray:
         """Sums (g, m, k, 3), in the units of Gathered.sh, of bright sky and bright surfaces sampled from the probes."""
@@ -289,17 +297,20 @@ class Gatherer:
 
     def _visibility(self, item: Item, traced: Traced) -> tuple[np.ndarray, np.ndarray]:
         g, n, m = item.shape
-        if item.first >= VISIBILITY_RAYS:
-            return np.float32(0), np.float32(0)
-        t = np.full(item.ray_count, np.inf, np.float32)
-        t[traced.rows] = traced.t
-        t = np.minimum(t.reshape(g, n, m), self._placement.reach[item.probes][:, None])
-        weight = np.maximum(traced.directions @ self._tile_directions.T, 0).reshape(g, n, -1)
-        for _ in range(_VISIBILITY_SQUARINGS):
-            weight *= weight
-        both = np.concatenate([t, t * t], axis=2)
-        sums = np.matmul(weight.transpose(0, 2, 1), both).reshape(g, -1, 2, m)
-        return sums.transpose(0, 3, 1, 2), weight.sum(axis=1)[:, None, :]
+        tiles = self._resolution**2
+        sums, weights = np.zeros((g * tiles, m, 2), np.float32), np.zeros(g * tiles, np.float32)
+        early = np.flatnonzero(np.repeat(item.first < VISIBILITY_RAYS, n))
+        if early.size:
+            t = np.full(item.ray_count, np.inf, np.float32)
+            t[traced.rows] = traced.t
+            t = np.minimum(t.reshape(g, n, m), self._placement.reach[item.probes][:, None]).reshape(g * n, m)
+            cell = octahedral.texel_index(traced.directions[early], self._resolution) + early // n * tiles
+            order = np.argsort(cell, kind="stable")
+            cells, first, count = np.unique(cell[order], return_index=True, return_counts=True)
+            t = t[early[order]]
+            sums[cells, :, 0], sums[cells, :, 1] = np.add.reduceat(t, first, axis=0), np.add.reduceat(t * t, first, axis=0)
+            weights[cells] = count
+        return sums.reshape(g, tiles, m, 2).transpose(0, 2, 1, 3), weights.reshape(g, 1, tiles)
 
 
 def _turn(numbers: np.ndarray, source: int) -> np.ndarray:
@@ -313,7 +324,9 @@ def _fraction(hashed: np.ndarray) -> np.ndarray:
 
 
 def project(basis: np.ndarray, radiance: np.ndarray) -> np.ndarray:
-    """Sum over directions of ``basis`` (g, n, k) times ``radiance`` (g, n, m, 3): (g, m, k, 3)."""
+    """Sum over directions of ``basis`` (g, n, k) times ``radiance`` (g, n, m, c): (g, m, k, c)."""
     g, n, m, channels = radiance.shape
+    # OpenBLAS starts threads of its own for products of 2^18 multiplications or more, which under our threads only wait for each
+    # other; a block of rays stays below.
     products = np.matmul(basis.transpose(0, 2, 1), radiance.reshape(g, n, m * channels))
     return products.reshape(g, -1, m, channels).transpose(0, 2, 1, 3)

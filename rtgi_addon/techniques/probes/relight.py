@@ -87,7 +87,7 @@ def relight(bake, scene: Scene, progress: Progress) -> tuple[ProbeGrid, ...]:
 
     parts = parallel_for(work, len(bake.memory.items), context.threads, progress.span(0.7, 1.0), "relighting probes")
     for kept, part in zip(bake.memory.items, parts, strict=True):
-        sums[kept.item.probes] += part
+        np.add.at(sums, kept.item.probes, part)
     if bake.emitted is not None:
         sums += bake.emitted
     coefficients = sums / np.maximum(bake.model.rays, 1)[:, None, None]
