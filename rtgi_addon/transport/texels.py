@@ -90,11 +90,10 @@ class TexelLayout:
         normal = self._geometry.normals_world[triangles]
         # 26 facings: each axis is −, 0 or + of the rounded normal.
         facing = np.rint(normal * 1.2).astype(np.int64) @ np.array([1, 3, 9]) + 13
-        key = facing + 32 * self._geometry.material[triangles].astype(np.int64)
-        with np.errstate(over="ignore"):
-            for part in (cell[:, 0], cell[:, 1], cell[:, 2], level):
-                key = (key ^ part) * np.int64(-7046029254386353131)
-                key ^= key >> np.int64(29)
+        key = np.zeros(len(triangles), np.uint64)
+        for part in (facing, self._geometry.material[triangles], level, cell[:, 0], cell[:, 1], cell[:, 2]):
+            key = (key ^ part.astype(np.int64).astype(np.uint64)) * np.uint64(0x9E3779B97F4A7C15)
+            key ^= key >> np.uint64(29)
         _, group = np.unique(key, return_inverse=True)
         group = group.reshape(-1)
         order = np.argsort(group, kind="stable")
