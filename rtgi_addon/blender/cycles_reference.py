@@ -240,17 +240,21 @@ def _render(scene, folder: Path) -> np.ndarray:
 
     Python cannot read a Render Result's pixels in the background, so the picture goes through a float EXR.
     """
-    import OpenEXR
     path = folder / "render.exr"
     path.unlink(missing_ok=True)
     scene.render.filepath = str(path)
     bpy.ops.render.render(scene=scene.name, write_still=True)
     if not path.exists():
         raise BakeError(f"Cycles wrote no picture for {scene.name!r}", "look at Blender's console for the reason")
-    with OpenEXR.File(str(path)) as file:
-        channels = file.channels()
-        pixels = channels["RGB"].pixels if "RGB" in channels else np.stack([channels[c].pixels for c in "RGB"], axis=-1)
-        return np.asarray(pixels, np.float64)[::-1]
+    image = bpy.data.images.load(str(path))
+    try:
+        image.colorspace_settings.name = "Non-Color"
+        width, height = image.size
+        pixels = np.empty(height * width * image.channels, np.float32)
+        image.pixels.foreach_get(pixels)
+        return pixels.reshape(height, width, -1)[..., :3].astype(np.float64)
+    finally:
+        bpy.data.images.remove(image)
 
 
 @contextmanager
@@ -293,7 +297,7 @@ def _rendering(scene: bpy.types.Scene, settings: CyclesSettings):
                glossy_bounces=settings.bounces, transmission_bounces=settings.bounces,
                transparent_max_bounces=max(settings.bounces, scene.cycles.transparent_max_bounces), min_light_bounces=0,
                min_transparent_bounces=0)
-        for obj in scene.objects:
+        for obj in bpy.data.objects:  # not scene.objects: a lamp may be there only through a collection instance
             if obj.type == "LIGHT":
                 set_to(obj, visible_camera=False)
         yield camera

@@ -43,7 +43,7 @@ def lamp_in_a_box(scene):
     lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "POINT"))
     lamp.data.energy, lamp.data.shadow_soft_size = 40.0, 0.2
     scene.collection.objects.link(lamp)
-    lamp.location = (0.3, 0.0, 0.5)
+    lamp.location, lamp.visible_camera = (0.3, 0.0, 0.5), True
     return lamp
 
 
@@ -60,7 +60,8 @@ def state(owner):
 def everything(scene):
     owners = (scene, scene.render, scene.render.image_settings, scene.cycles, scene.view_settings)
     return [state(owner) for owner in owners] + [scene.camera, *(state(obj) for obj in scene.objects),
-                                                 [len(bpy.data.cameras), len(bpy.data.texts), len(bpy.data.objects)]]
+                                                 [len(bpy.data.cameras), len(bpy.data.objects),
+                                                  [image.name for image in bpy.data.images if image.type != "RENDER_RESULT"]]]
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -87,6 +88,20 @@ def test_both_methods_agree_in_a_lit_box_and_hide_the_lamp(empty_blend):
     assert (difference < 4 * noise + 2e-3 * size).all()
     # Seen directly, the lamp of 0.2 m would add 40 / (4π · π · 0.2²) over a solid angle of about 0.4 sr at the first point.
     assert tiles["sh"][0, 0].max() < 40.0
+
+
+def test_a_lamp_in_an_instanced_collection_is_hidden_too(empty_blend):
+    scene = bpy.context.scene
+    lamp = lamp_in_a_box(scene)
+    scene.collection.objects.unlink(bpy.data.objects["Cube"])
+    collection = bpy.data.collections.new("Fitting")
+    scene.collection.objects.unlink(lamp)
+    collection.objects.link(lamp)
+    empty = bpy.data.objects.new("Placed", None)
+    empty.instance_type, empty.instance_collection = "COLLECTION", collection
+    scene.collection.objects.link(empty)
+    assert not render_probes([(0, 0, 0)], CyclesSettings(samples=4, resolution=16))["sh"].any()
+    assert lamp.visible_camera
 
 
 def test_a_point_is_rendered_where_it_was_asked_for(empty_blend):
