@@ -17,8 +17,11 @@ from .vectors import dot
 
 # A slot is split into at most this many texels; what none of their seeds sees joins the last.
 MAX_PARTS = 4
-# Segments between two points of a texel end this share short, so that neither end's own surface counts.
-_SHORT = np.float32(1.0 - 1e-4)
+# Segments between two points of a texel end this share short, so that rounding does not take the far end's own surface for a wall.
+# Much more, and a seed close to a wall would see both its sides.
+_SHORT = np.float32(1.0 - 1e-6)
+# Sides of a cell's rim and diagonals, as pairs of corners.
+_RIM = np.array([(0, 1), (1, 2), (2, 3), (3, 4), (4, 0), (0, 2), (0, 3), (1, 4)])
 
 
 @dataclass(eq=False)
@@ -139,9 +142,8 @@ class TexelTable:
         rows, _, corners = self._layout.rim(seeds.slots)
         if rows.size:
             corners = corners + (normal[rows] * lift[rows, None])[:, None, :]
-            start = np.concatenate([corners[:, i] for i in (0, 1, 2, 3, 0, 1)])
-            end = np.concatenate([corners[:, i] for i in (1, 2, 3, 0, 2, 3)])
-            mixed[rows] |= self._segment(start, end).reshape(6, len(rows)).any(axis=0)
+            start, end = (np.swapaxes(corners[:, side], 0, 1).reshape(-1, 3) for side in _RIM.T)
+            mixed[rows] |= self._segment(start, end).reshape(len(_RIM), len(rows)).any(axis=0)
         return mixed, accepted
 
     def _blocked(self, hits: SurfaceHits, texel: np.ndarray) -> np.ndarray:

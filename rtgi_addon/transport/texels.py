@@ -13,6 +13,8 @@ from .geometry import Geometry
 
 # Slots are addressed by a dense map of this many 32-bit entries at most (both sides): coarser texels beyond.
 MAX_SLOTS = 1 << 24
+# A cell's rim is drawn inwards by this share: a wall along an edge of the cell does not stand across it.
+INSET = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,18 +136,22 @@ class TexelLayout:
         return result
 
     def rim(self, slots: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Indices (m,) into ``slots`` of cells of large triangles, the triangle of each, and their corners (m, 4, 3) in world
-        space, a little inside the cell: what stands across a cell crosses its rim."""
+        """Indices (m,) into ``slots`` of cells of large triangles, the triangle of each, and the corners (m, 5, 3) in world space of
+        what the triangle leaves of the cell, drawn a little inwards: what stands across a cell crosses its rim. Cells that the
+        long edge does not cut have one corner twice."""
         rows = np.flatnonzero(slots >> 1 >= self._group_count)
         triangle, a0, width, b0, height = self._cell(slots[rows] >> 1)
-        corners = []
-        for x, y in ((1e-3, 1e-3), (0.999, 1e-3), (0.999, 0.999), (1e-3, 0.999)):
-            a, b = a0 + width * x, b0 + height * y
-            # Corners beyond the long edge are drawn back onto it.
-            excess = np.maximum(a + b - 0.9999, 0.0) * 0.5
-            a, b = a - excess, b - excess
-            corners.append(self._origin[triangle] + a[:, None] * self._edge_a[triangle] + b[:, None] * self._edge_b[triangle])
-        return rows, triangle, np.stack(corners, axis=1).astype(np.float32)
+        limit = np.maximum(1.0 - a0 - b0, 1e-9)
+        x, y = np.minimum(limit / width, 1.0), np.minimum(limit / height, 1.0)
+        x_top, y_right = np.clip((limit - height * y) / width, 0.0, x), np.clip((limit - width * x) / height, 0.0, y)
+        none = np.zeros_like(x)
+        a = np.stack([none, x, x, x_top, none], axis=1)
+        b = np.stack([none, none, y_right, y, y], axis=1)
+        a, b = (part + INSET * (part.mean(axis=1, keepdims=True) - part) for part in (a, b))
+        a, b = a0[:, None] + width[:, None] * a, b0[:, None] + height[:, None] * b
+        corners = (self._origin[triangle, None] + a[..., None] * self._edge_a[triangle, None]
+                   + b[..., None] * self._edge_b[triangle, None])
+        return rows, triangle, corners.astype(np.float32)
 
     def sample(self, slots: np.ndarray, xi: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Uniform points on the surfaces of ``slots`` (n,), ``m`` each, from ``xi`` (m, n, 2) in [0, 1).

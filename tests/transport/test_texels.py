@@ -151,24 +151,22 @@ def test_materials_do_not_share_texels():
 
 @pytest.mark.parametrize("mesh", [MESHES["cube of large faces"], MESHES["obtuse"], MESHES["a kilometre of ground"]],
                          ids=["cube", "obtuse", "ground"])
-def test_a_rim_lies_just_inside_its_slot(mesh):
-    """Corners within the triangle map back to the slot; those cut off by the long edge lie on that edge."""
+def test_a_rim_encloses_its_cell(mesh):
+    """All five corners lie in the slot's own cell, and the polygon they make has nearly its area, cut by the long edge or not."""
     geometry, layout = layout_of(mesh)
     slots = np.unique(layout.slots(*random_hits(geometry, 5000)))
     rows, triangle, corners = layout.rim(slots)
-    assert np.array_equal(rows, np.arange(len(slots))) and corners.shape == (len(slots), 4, 3)
+    assert np.array_equal(rows, np.arange(len(slots))) and corners.shape == (len(slots), 5, 3)
+    corners, areas = corners.astype(float), layout.areas(slots)
     origin = geometry.triangles_world[triangle, 0].astype(float)
     edges = geometry.triangles_world[triangle, 1:].astype(float) - origin[:, None]
-    inverse = np.linalg.pinv(np.swapaxes(edges, 1, 2))
-    uv = np.einsum("nij,nkj->nki", inverse, corners - origin[:, None])
-    assert uv.min() > -1e-4 and uv.sum(axis=2).max() < 1 + 1e-4
-    inside = np.min(np.concatenate([uv, 1 - uv.sum(axis=2, keepdims=True)], axis=2), axis=2) > 2e-3
-    flat = np.clip(uv, 0, 1).astype(np.float32)
-    again = layout.slots(np.repeat(triangle, 4), flat[..., 0].ravel(), flat[..., 1].ravel(), np.repeat(slots & 1, 4).astype(bool))
-    same = again.reshape(-1, 4) == slots[:, None]
-    # Cells that reach over the long edge keep those corners that are inside the triangle.
-    whole = inside.all(axis=1)
-    assert whole.mean() > 0.3 and same[whole].mean() > 0.99
+    uv = np.einsum("nij,nkj->nki", np.linalg.pinv(np.swapaxes(edges, 1, 2)), corners - origin[:, None])
+    again = layout.slots(np.repeat(triangle, 5), *uv.astype(np.float32).reshape(-1, 2).T, np.repeat(slots & 1, 5).astype(bool))
+    large = areas > 1e-3 * areas.max()
+    assert np.all((again.reshape(-1, 5) == slots[:, None])[large])
+    fan = corners[:, 1:] - corners[:, :1]
+    covered = 0.5 * np.linalg.norm(np.cross(fan[:, :-1], fan[:, 1:]).sum(axis=1), axis=1)
+    np.testing.assert_allclose(covered[large], areas[large], rtol=4e-3)
 
 
 def test_texels_double_until_they_fit(monkeypatch):
