@@ -4,6 +4,10 @@ A floor runs on under the walls of two rooms: one value for a cell that both roo
 other, and a mean over the hidden strip beneath the wall would darken both. So a texel is what can be seen, just above the
 surface, from one point of the slot that a ray really reached (its seed). Where a slot's rim or interior is obstructed, each hit
 in it is tested against the seed, and those that do not see it make further texels with seeds of their own.
+
+What hangs close above a surface parts it just as well: the ceiling over a lamp's panel is the brightest spot of a room that no one
+sees, and the ceiling beside it must not share its light. So points with something less than a texel above them make one texel,
+points without another.
 """
 
 from dataclasses import dataclass
@@ -12,6 +16,7 @@ import numpy as np
 
 from .context import LightContext
 from .parallel import CHUNK, parallel_for
+from .rays import offset_origins
 from .texels import TexelLayout
 from .vectors import dot
 
@@ -45,7 +50,7 @@ class SurfaceHits:
 
 class TexelTable:
     """Grows by ``resolve``; rows are never moved. ``slots`` (n,) int32, ``seeds`` their SurfaceHits, ``mixed`` (n,) bool: the
-    slot is obstructed; ``accepted`` (n, points) bool: which of the slot's sample points see the seed.
+    slot is obstructed; ``accepted`` (n, points) bool: which of the slot's sample points see the seed and are covered like it.
 
     ``sample_numbers(slots)`` returns (points, n, 2) numbers in [0, 1), the same ones whenever it is asked.
     """
@@ -134,10 +139,10 @@ class TexelTable:
         base, normal, lift = self._lifted(seeds)
         xi = self._numbers(seeds.slots)
         primitive, u, v = (part.reshape(-1) for part in self._layout.sample(seeds.slots, xi))
-        repeated = np.tile(seeds.slots, self._point_count)
-        points, _, _ = self._lifted(SurfaceHits(primitive, u, v, repeated))
-        hidden = self._segment(np.tile(base, (self._point_count, 1)), points)
-        accepted = ~hidden.reshape(self._point_count, n).T
+        samples = SurfaceHits(primitive, u, v, np.tile(seeds.slots, self._point_count))
+        apart = self._segment(np.tile(base, (self._point_count, 1)), self._lifted(samples)[0])
+        apart |= self._covered(samples) != np.tile(self._covered(seeds), self._point_count)
+        accepted = ~apart.reshape(self._point_count, n).T
         mixed = ~accepted.all(axis=1)
         rows, _, corners = self._layout.rim(seeds.slots)
         if rows.size:
@@ -149,7 +154,16 @@ class TexelTable:
     def _blocked(self, hits: SurfaceHits, texel: np.ndarray) -> np.ndarray:
         if len(texel) == 0:
             return np.zeros(0, bool)
-        return self._segment(self._lifted(hits)[0], self._lifted(self.seeds.take(texel))[0])
+        seeds = self.seeds.take(texel)
+        return self._segment(self._lifted(hits)[0], self._lifted(seeds)[0]) | (self._covered(hits) != self._covered(seeds))
+
+    def _covered(self, hits: SurfaceHits) -> np.ndarray:
+        """(n,) bool: whether something is less than a texel above the surface."""
+        geometry = self._context.geometry
+        side = np.where(hits.slots & 1, np.float32(1), np.float32(-1))[:, None]
+        normal = geometry.normals_world[hits.primitive] * side
+        points = geometry.points(hits.primitive, hits.u, hits.v)
+        return self._context.tracer.occluded(offset_origins(points, normal, normal), normal, self._layout.sizes(hits.primitive))
 
     def _lifted(self, hits: SurfaceHits):
         geometry = self._context.geometry

@@ -117,6 +117,10 @@ class TexelLayout:
         slot = self._base[primitive] + column * self._stride[primitive] + row
         return 2 * slot + front
 
+    def sizes(self, primitive: np.ndarray) -> np.ndarray:
+        """Side (n,) float32 [m] that texels have on each triangle (n,), before they are fitted to its edges."""
+        return self._size[primitive]
+
     def lift(self, slots: np.ndarray, primitive: np.ndarray) -> np.ndarray:
         """Height (n,) [m] above the surface at which points of one texel are expected to see each other: little on a flat cell,
         more over small triangles, which may bulge."""

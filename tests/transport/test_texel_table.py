@@ -141,3 +141,30 @@ def test_a_restored_table_goes_on_as_before():
     other.table.restore(state)
     assert np.array_equal(other.table.resolve([second])[0], expected)
     assert all(np.array_equal(value, other.table.state()[name]) for name, value in cache.table.state().items())
+
+
+@pytest.mark.parametrize("height", [0.002, 0.05, 0.3], ids=["below the lift", "close", "most of a texel"])
+@pytest.mark.parametrize("turned", [0, 1])
+def test_what_hangs_close_above_a_floor_parts_what_it_covers_from_the_rest(height, turned):
+    """A panel over a floor, in any phase to its texels: what the panel hides or lights must not spread to the floor beside it."""
+    panel = build.mesh("panel", np.float32([[-0.9, -0.7, height], [1.1, -0.7, height], [1.1, 0.8, height], [-0.9, 0.8, height]]),
+                       [[0, 1, 2], [0, 2, 3]])
+    meshes, rotation, shift = in_rotated_space([build.plane(half_size=4.0), panel], turned)
+    context, cache = prepared(meshes)
+    hits = floor_hits(context, cache)
+    points = (context.geometry.points(hits.primitive, hits.u, hits.v) - shift) @ rotation
+    inside = np.minimum(np.minimum(points[:, 0] + 0.9, 1.1 - points[:, 0]), np.minimum(points[:, 1] + 0.7, 0.8 - points[:, 1]))
+    texel = cache.table.resolve([hits])[0]
+    under, beside = inside > 1e-4, inside < -1e-4
+    assert under.any() and np.intersect1d(texel[under], texel[beside]).size == 0
+    # What the sample points of a texel stand for is covered as its hits are.
+    texels = np.unique(texel[under])
+    sampled = (cache.surface(texels, cache.points)[3] - shift) @ rotation
+    assert np.all((sampled > np.array([-0.9, -0.7, -1]) - 1e-4) & (sampled < np.array([1.1, 0.8, 1]) + 1e-4))
+
+
+def test_what_hangs_a_texel_or_more_above_a_floor_parts_nothing():
+    panel = build.plane("panel", half_size=0.9, z=1.5 * SIZE)
+    context, cache = prepared([build.plane(half_size=4.0), panel])
+    cache.table.resolve([floor_hits(context, cache)])
+    assert not cache.table.mixed.any()
