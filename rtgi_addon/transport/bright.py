@@ -31,6 +31,7 @@ class BrightSurfaces:
         exact radiance (m, 3) that lamps leave at points, with points and normals (m, 3)."""
         self._context = context
         self.count, self.pdf_area = 0, np.zeros(len(slots) + 1, np.float32)
+        self._slots, self._slot_density = np.zeros(0, np.int32), np.zeros(0, np.float32)
         if len(slots) == 0:
             return
         brightness = luminance(radiance).astype(np.float64)
@@ -51,21 +52,32 @@ class BrightSurfaces:
         radiance, self._points, self._normals = light_at(unique[chosen], primitive, u, v, xi[:, 3:5])
         self._radiance, self._density = radiance, density[chosen]
         self.count = POOL
-        # A texel of a bright slot that is itself dark shares the slot's density: the weights belong to points, not to texels.
-        position = np.minimum(np.searchsorted(unique, slots), len(unique) - 1)
-        self.pdf_area[:-1] = np.where(unique[position] == slots, density[position], 0)
+        self._slots, self._slot_density = unique.astype(np.int32), density
+        self.cover(slots)
+
+    def cover(self, slots: np.ndarray) -> None:
+        """Bring ``pdf_area`` up to date with the slots (n,) of all texels.
+
+        A texel of a bright slot shares the slot's density even if it is dark itself or was made later: pool points lie all over
+        the slot, and a hit there must be weighted against them.
+        """
+        self.pdf_area = np.zeros(len(slots) + 1, np.float32)
+        if self.count:
+            position = np.minimum(np.searchsorted(self._slots, slots), len(self._slots) - 1)
+            self.pdf_area[:-1] = np.where(self._slots[position] == slots, self._slot_density[position], 0)
 
     def state(self) -> dict[str, np.ndarray]:
         """Everything in it, for a checkpoint."""
         pool = {} if self.count == 0 else {"points": self._points, "normals": self._normals, "radiance": self._radiance,
                                            "density": self._density}
-        return {"pdf_area": self.pdf_area, **pool}
+        return {"pdf_area": self.pdf_area, "slots": self._slots, "slot_density": self._slot_density, **pool}
 
     @classmethod
     def restored(cls, context: LightContext, arrays: dict[str, np.ndarray]) -> "BrightSurfaces":
         """One made from ``state``."""
         self = object.__new__(cls)
         self._context, self.pdf_area = context, arrays["pdf_area"]
+        self._slots, self._slot_density = arrays["slots"], arrays["slot_density"]
         self.count = len(arrays.get("points", ()))
         if self.count:
             self._points, self._normals = arrays["points"], arrays["normals"]

@@ -271,9 +271,7 @@ class SurfaceCache:
             slots, radiance = (self.table.slots, self._reflected()[:-1]) if bright else (self.table.slots[:0], self._reflected()[:0])
             self.bright = BrightSurfaces(self.context, self.layout, slots, radiance, self._light.radiance_at, self._seed)
             self._first_bounce = np.zeros((1, 3), np.float32)
-        missing = self.count + 1 - len(self.bright.pdf_area)
-        if missing:
-            self.bright.pdf_area = np.concatenate([self.bright.pdf_area, np.zeros(missing, np.float32)])
+        self.bright.cover(self.table.slots)
         self._first_bounce = self._gather_first_bounce(progress)
         fixed = self.irradiance_sky + self.irradiance_emission
         received = solve_radiosity(self.form_factors, fixed, self._first_bounce, self.albedo, bounces, tolerance,
