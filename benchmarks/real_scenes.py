@@ -4,9 +4,9 @@
 
 FILE is a .blend, .glb or .gltf; ``--world`` puts an environment image around each of them in place of its world. Every file is
 opened, extracted and baked as the command line does it, and some of its usable probes, far from one another, are rendered with
-Cycles. Differences are then taken apart in three steps, each a relative RMSE of the SH coefficients at the same probes:
+Cycles. Differences are taken apart in three steps, each a relative RMSE of the SH coefficients at the same probes:
 
-- *Cycles*: the bake against Cycles on the file as it is. Signed bias (of the mean radiance) and the worst probe belong to this one.
+- *Cycles*: the bake against Cycles on the file as it is. Signed bias (of the mean radiance) and the worst probe belong to it.
 - *matte*: the same, both sides anew, with every material's gloss, bumps and Oren-Nayar roughness taken away. What is left is what
   extraction or transport get wrong; what went away is what diffuse transport cannot know.
 - *path*: the bake against the path reference on the very Scene that was baked: what the bake alone gets wrong.
@@ -100,10 +100,11 @@ def bake() -> tuple:
 
 def choose(grids, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Positions (n, 3) of at most ``count`` usable probes in the open, and their flat indices over all ``grids``."""
-    points = np.concatenate([lattice.lattice_points(g.volume.world_from_local, g.volume.resolution).reshape(-1, 3) for g in grids])
+    volumes = [grid.volume for grid in grids]
+    points = np.concatenate([lattice.lattice_points(v.world_from_local, v.resolution).reshape(-1, 3) for v in volumes])
     usable = np.flatnonzero(np.concatenate([g.usable.ravel() for g in grids]))
     usable = usable[np.unique(np.linspace(0, len(usable) - 1, 400).astype(int))]
-    clearance = 0.1 * min(float(lattice.cell_size(g.volume.world_from_local, g.volume.resolution).min()) for g in grids)
+    clearance = 0.1 * min(float(lattice.cell_size(v.world_from_local, v.resolution).min()) for v in volumes)
     chosen = usable[points_in_the_open(bpy.context.scene, points[usable], clearance, count)]
     return points[chosen], chosen
 
@@ -158,7 +159,7 @@ def measure(path: Path, options, say) -> str:
     matte_reference, matte_variance = cycles(points, options.noise, options.seconds)
     matte = coefficients(matte_grids, chosen)
     matte_bias = signed_bias(matte, matte_reference)
-    say(f"  matte: noise {_noise(matte_reference, matte_variance):.2%}, bias {matte_bias.value:+.2%} ± {matte_bias.standard_error:.2%}")
+    say(f"  matte: noise {_noise(matte_reference, matte_variance):.2%}, bias {matte_bias.value:+.2%}")
     name = path.name if options.world is None else f"{path.name} in {options.world.name}"
     triangles = sum(len(scene.meshes[instance.mesh].triangles) for instance in scene.instances)
     usable = np.concatenate([g.usable.ravel() for g in grids])

@@ -71,12 +71,29 @@ class Solids:
 
 def closed_components(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     """Connected parts of a mesh: a label per triangle (t,), and whether each part (c,) is closed: every edge is shared by two
-    triangles that run through it in opposite directions."""
+    triangles that run through it in opposite directions.
+
+    Parts that are open by their vertices' indices are looked at again by their positions: files like glTF split vertices wherever
+    normals or UV break, and a box of theirs is six loose quads.
+    """
     triangles = mesh.triangles.astype(np.int64)
-    label = _connected(triangles, len(mesh.vertices_local))
+    label, closed = _parts(triangles, len(mesh.vertices_local))
+    loose = np.flatnonzero(~closed[label])
+    if loose.size == 0:
+        return label, closed
+    point = _first_of_equal(mesh.vertices_local)
+    welded_label, welded_closed = _parts(point[triangles[loose]], len(point))
+    label[loose] = len(closed) + welded_label
+    kept, label = np.unique(label, return_inverse=True)
+    return label.reshape(-1), np.concatenate([closed, welded_closed])[kept]
+
+
+def _parts(triangles: np.ndarray, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
+    """``closed_components`` of ``triangles`` (t, 3) as their indices tell it."""
+    label = _connected(triangles, vertex_count)
     start, end = triangles.reshape(-1), np.roll(triangles, -1, axis=1).reshape(-1)
     low, high = np.minimum(start, end), np.maximum(start, end)
-    order = np.argsort(low * (len(mesh.vertices_local) + 1) + high, kind="stable")
+    order = np.argsort(low * (vertex_count + 1) + high, kind="stable")
     low, high, direction = low[order], high[order], np.where(start < end, 1, -1)[order]
     first = np.flatnonzero(np.append(True, (low[1:] != low[:-1]) | (high[1:] != high[:-1])))
     count = np.diff(np.append(first, len(low)))
@@ -84,6 +101,16 @@ def closed_components(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     closed = np.ones(int(label.max(initial=-1)) + 1, bool)
     closed[label[order[first[~good]] // 3]] = False
     return label, closed
+
+
+def _first_of_equal(positions: np.ndarray) -> np.ndarray:
+    """For each of ``positions`` (n, 3), one index (n,) that all with the very same coordinates share."""
+    order = np.lexsort(positions.T)
+    ordered = positions[order]
+    first = np.append(True, np.any(ordered[1:] != ordered[:-1], axis=1))
+    shared = np.empty(len(positions), np.int64)
+    shared[order] = order[np.flatnonzero(first)[np.cumsum(first) - 1]]
+    return shared
 
 
 def _connected(triangles: np.ndarray, vertex_count: int) -> np.ndarray:
@@ -102,7 +129,7 @@ def _connected(triangles: np.ndarray, vertex_count: int) -> np.ndarray:
 
 
 def winding_number(triangles: np.ndarray, point: np.ndarray) -> float:
-    """How often closed ``triangles`` (t, 3, 3) wind around ``point`` (3,): 1 inside, 0 outside (Van Oosterom and Strackee 1983)."""
+    """How often closed ``triangles`` (t, 3, 3) go around ``point`` (3,): 1 inside, 0 outside (Van Oosterom and Strackee 1983)."""
     a, b, c = (triangles[:, i] - point for i in range(3))
     la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
     numerator = np.einsum("ij,ij->i", a, np.cross(b, c))

@@ -70,6 +70,28 @@ def test_edges_shared_by_more_or_running_the_same_way_are_not_closed():
     assert closed_components(twice)[1].tolist() == [False]
 
 
+def split_vertices(mesh):
+    """The same triangles with three vertices each of their own, as a file writes them where normals or UV break."""
+    return build.mesh(mesh.name, mesh.vertices_local[mesh.triangles.reshape(-1)], np.arange(mesh.triangles.size).reshape(-1, 3))
+
+
+def test_vertices_split_for_normals_leave_a_solid_closed():
+    label, closed = closed_components(split_vertices(build.cube()))
+    assert not label.any() and closed.tolist() == [True]
+    assert closed_components(split_vertices(without(build.cube(), 2)))[1].tolist() == [False]
+    assert not closed_components(split_vertices(build.cube(inward=True)))[0].any()
+    scene = build.scene([split_vertices(build.cube())])
+    assert solid(scene).all()
+
+
+def test_solids_that_only_touch_stay_solids_of_their_own():
+    """Two boxes with an edge in common have four triangles at it, but none of the vertices is shared."""
+    parts = joined(build.cube(), moved(build.cube(), (2, 2, 0)), moved(split_vertices(build.sphere(subdivisions=2)), (9, 0, 0)))
+    label, closed = closed_components(parts)
+    assert closed.tolist() == [True] * 3
+    assert len(set(label[:12])) == len(set(label[12:24])) == len(set(label[24:])) == 1
+
+
 @pytest.mark.parametrize("mesh", [build.cube(), build.sphere(subdivisions=2), build.cube(inward=True)],
                          ids=["cube", "sphere", "room"])
 def test_winding_number(mesh):
