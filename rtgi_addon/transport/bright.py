@@ -7,7 +7,7 @@ Keller 1997) and balanced against rays that hit them (Veach 1995), so nothing ne
 
 import numpy as np
 
-from ..numerics.sampling import hash_u32, sobol_owen
+from ..numerics.sampling import hash_u32, sobol_owen_at
 from .concentration import concentration_limit
 from .context import LightContext
 from .rays import offset_origins
@@ -44,12 +44,13 @@ class BrightSurfaces:
         power = np.bincount(index.reshape(-1), brightness[rows] * areas[rows])
         slot_area = layout.areas(unique)
         cdf = np.cumsum(power) / power.sum()
-        xi = sobol_owen(POOL, 5, hash_u32(seed, 0xB51))
-        xi = xi[np.argsort(xi[:, 0], kind="stable")]
-        chosen = np.minimum(np.searchsorted(cdf, xi[:, 0], side="right"), len(unique) - 1)
+        chosen = np.minimum(np.searchsorted(cdf, (np.arange(POOL) + 0.5) / POOL, side="right"), len(unique) - 1)
+        # Each slot's share of the points is a sequence of its own: a patch's edge of light and shadow sets all the light of a room.
+        index = np.arange(POOL) - np.searchsorted(chosen, chosen)
+        xi = sobol_owen_at(index, 4, hash_u32(seed, unique)[chosen])
         density = (power / power.sum() / slot_area).astype(np.float32)
-        primitive, u, v = (part[0] for part in layout.sample(unique[chosen], xi[None, :, 1:3]))
-        radiance, self._points, self._normals = light_at(unique[chosen], primitive, u, v, xi[:, 3:5])
+        primitive, u, v = (part[0] for part in layout.sample(unique[chosen], xi[None, :, :2]))
+        radiance, self._points, self._normals = light_at(unique[chosen], primitive, u, v, xi[:, 2:])
         self._radiance, self._density = radiance, density[chosen]
         self.count = POOL
         self._slots, self._slot_density = unique.astype(np.int32), density

@@ -7,7 +7,9 @@ from ..numerics.sampling import hash_u32
 # Sources up to this number are all sampled at every point; beyond, points sample a few chosen by importance.
 ALL_SOURCES = 4
 # How many choices a texel keeps, for itself and for the hits that fall into it.
-CHOICES = 16
+CHOICES = 64
+# A pool point of the bright surfaces samples one in so many of its choices: there are many such points.
+POOL_STRIDE = 8
 # Share of a texel's choices made blindly: a lamp that the texel's centre misjudges still gets its light across.
 DEFENSIVE = 0.2
 
@@ -49,12 +51,18 @@ class TexelLight:
             return mean, smooth[:, None], choices, weights
         choices, weights = self._choose(slots, points[:n], shading[:n])
         passes = -(-CHOICES // samples)
+        squares = np.zeros(n)
         for number in range(passes):
             column = (np.arange(samples) + number * samples) % CHOICES
             light = self._sources.irradiance(choices[:, column].T.reshape(-1).astype(np.int64), points, shading, face, reach, uv)
-            light *= weights[:, column].T.reshape(-1, 1) / np.float32(passes)
-            result += light.reshape(samples, n, 3).mean(axis=0)
-        return result, np.zeros((n, 1), bool), choices, weights
+            light = (light * weights[:, column].T.reshape(-1, 1)).reshape(samples, n, 3)
+            result += light.mean(axis=0) / np.float32(passes)
+            squares += np.square(light, dtype=np.float64).sum(axis=(0, 2))
+        # Here the samples differ by their source as well: what must be small is the error of their mean.
+        count = samples * passes
+        mean_square = np.square(result, dtype=np.float64).sum(axis=1)
+        smooth = squares / count - mean_square <= (0.5 * self._cache.smoothness) ** 2 * count * mean_square
+        return result, smooth[:, None], choices, weights
 
     def radiance_at(self, slots, primitive, u, v, uv):
         """Radiance (m, 3) that the sources' light leaves at points of slots by reflection, and their points and face normals."""
@@ -66,9 +74,9 @@ class TexelLight:
                 irradiance += self._sources.irradiance(source, points, shading, face, reach, uv)
         else:
             choices, weights = self._choose(slots, points, shading)
-            for column in range(0, CHOICES, 2):
+            for column in range(0, CHOICES, POOL_STRIDE):
                 light = self._sources.irradiance(choices[:, column].astype(np.int64), points, shading, face, reach, uv)
-                irradiance += light * (weights[:, column, None] / np.float32(CHOICES // 2))
+                irradiance += light * (weights[:, column, None] / np.float32(CHOICES // POOL_STRIDE))
         albedo = self._cache.context.surfaces.albedo(primitive, u, v)
         return irradiance * albedo * np.float32(1 / np.pi), points, face
 
