@@ -61,7 +61,7 @@ class TexelLight:
         # Here the samples differ by their source as well: what must be small is the error of their mean.
         count = samples * passes
         mean_square = np.square(result, dtype=np.float64).sum(axis=1)
-        smooth = squares / count - mean_square <= (0.5 * self._cache.smoothness) ** 2 * count * mean_square
+        smooth = squares / count - mean_square <= (2.0 * self._cache.smoothness) ** 2 * count * mean_square
         return result, smooth[:, None], choices, weights
 
     def radiance_at(self, slots, primitive, u, v, uv):

@@ -67,7 +67,7 @@ def many_lamps(count=30, albedo=0.6, seed=7, **volume_options):
     rng = np.random.default_rng(seed)
     lamps = [build.point_light(rng.uniform(-0.9, 0.9, 3) * [1, 1, 0.3] + [0, 0, 0.6], 0.05 * 20 ** rng.random() * rng.random(3))
              for _ in range(count)]
-    block = moved(build.cube("block", 0.3), (0.1, -0.1, -0.3))
+    block = moved(build.cube("block", 0.25), (0.1, -0.1, -0.72))
     return build.scene([build.cube("room", 1.0, inward=True), block], [build.material("wall", albedo)], lamps,
                        volumes=[build.volume(**volume_options)], name="many_lamps")
 

@@ -86,6 +86,7 @@ class ShaderReader:
         multiple = node.distribution == "MULTI_GGX"
         if self._number(node, "Sheen Weight", path) > 0.0:
             self._remark("its sheen is left out")
+        self._shape_of_reflection(node, self._number(node, "Diffuse Roughness", path))
 
         reflected = base * (1.0 - specular) + Value.of(specular)
         passed = _BLACK
@@ -116,7 +117,16 @@ class ShaderReader:
 
     def _diffuse(self, node, path: tuple) -> Surface:
         color = self._input(node, "Color", path)
+        if node.bl_idname == "ShaderNodeBsdfDiffuse":
+            self._shape_of_reflection(node, self._number(node, "Roughness", path))
         return Surface(color, base_color=color)
+
+    def _shape_of_reflection(self, node, roughness: float) -> None:
+        """Say what bends diffuse reflection in Cycles and not here; the reflected flux is right all the same."""
+        if roughness > 0.0:
+            self._remark("its rough diffuse reflection (Oren-Nayar) is treated as even in all directions")
+        if node.inputs["Normal"].is_linked:
+            self._remark("its bumps are left out")
 
     def _translucent(self, node, path: tuple) -> Surface:
         self._remark("its translucency is treated as reflection")
