@@ -19,7 +19,7 @@ class Progress:
         self._interval = interval
         self._cancelled = threading.Event()
         self._started = time.monotonic()
-        self._last = 0.0
+        self._last = self._furthest = 0.0
         self._span = (0.0, 1.0)
         self._parent = None
         self.stage_seconds: dict[str, float] = {}
@@ -61,6 +61,8 @@ class Progress:
         if self._parent is not None:
             self._parent.step(overall, label)
             return
+        # Work whose extent is only guessed may be found to be more; a bar that runs backwards tells nobody anything.
+        overall = self._furthest = max(overall, self._furthest)
         now = time.monotonic()
         if self._report is None or (now - self._last < self._interval and fraction < 1.0):
             return

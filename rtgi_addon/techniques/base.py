@@ -111,12 +111,16 @@ class Checkpoint:
 
 
 class Technique(ABC):
-    """One GI technique: a name, a frozen ``Settings`` dataclass, and ``bake``."""
+    """One GI technique: a name, a frozen ``Settings`` dataclass, and ``bake``.
+
+    ``tolerance`` is the relative error of irradiance that it declares for scenes with a closed form, at default settings.
+    """
 
     name: ClassVar[str]
     label: ClassVar[str]
     description: ClassVar[str]
     Settings: ClassVar[type]
+    tolerance: ClassVar[float] = 0.02
 
     @abstractmethod
     def bake(self, scene: Scene, settings, rng: np.random.Generator, progress: Progress, *, threads: int | None = None,

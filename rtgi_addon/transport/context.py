@@ -1,9 +1,11 @@
 """Everything light transport derives from a scene once: triangles, BVH, material lookups, tables of light."""
 
+from dataclasses import fields, is_dataclass
+
 import numpy as np
 
 from ..errors import BakeError
-from ..scene import Scene, World
+from ..scene import Scene
 from .emitters import EmitterTable
 from .environment import Environment
 from .geometry import flatten
@@ -27,20 +29,31 @@ class LightContext:
 
     def relit(self, scene: Scene) -> "LightContext":
         """The same triangles, BVH and materials under the lamps and world of ``scene``. Raises BakeError if those differ."""
-        if scene.meshes is not self.scene.meshes and _geometry_key(scene) != _geometry_key(self.scene):
-            raise BakeError("the scene's geometry has changed since the bake", "bake again; relighting follows lamps and world only")
+        for part in ("meshes", "instances", "materials"):
+            if not _same(getattr(scene, part), getattr(self.scene, part)):
+                what = "materials have" if part == "materials" else "geometry has"
+                raise BakeError(f"the scene's {what} changed since the bake",
+                                "bake again; relighting follows lamps and world only")
         other = object.__new__(LightContext)
         other.__dict__.update(self.__dict__)
         other.scene, other.lamps = scene, LampTable(scene.lights)
-        if not _same_world(scene.world, self.scene.world):
+        if not _same(scene.world, self.scene.world):
             other.environment = Environment(scene.world)
         return other
 
 
-def _geometry_key(scene: Scene) -> tuple:
-    meshes = tuple((mesh.name, mesh.vertices_local.tobytes(), mesh.triangles.tobytes()) for mesh in scene.meshes)
-    return meshes, tuple((instance.mesh, np.asarray(instance.world_from_local).tobytes()) for instance in scene.instances)
-
-
-def _same_world(a: World, b: World) -> bool:
-    return a is b or (np.array_equal(a.equirect, b.equirect) and np.array_equal(a.map_from_world, b.map_from_world))
+def _same(a, b) -> bool:
+    """Whether two parts of scenes hold the same values."""
+    if a is b:
+        return True
+    if type(a) is not type(b):
+        return False
+    if isinstance(a, np.ndarray):
+        return np.array_equal(a, b)
+    if is_dataclass(a):
+        return all(_same(getattr(a, item.name), getattr(b, item.name)) for item in fields(a))
+    if isinstance(a, dict):
+        return a.keys() == b.keys() and all(_same(value, b[key]) for key, value in a.items())
+    if isinstance(a, tuple):
+        return len(a) == len(b) and all(_same(x, y) for x, y in zip(a, b, strict=True))
+    return a == b

@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import BakeError
 from ..numerics.sampling import cosine_hemisphere, frame, hash_u32, sobol_owen
 from ..progress import Progress
-from .bright import TEXEL_SAMPLES, BrightSurfaces
+from .bright import TEXEL_CANDIDATES, TEXEL_SAMPLES, BrightSurfaces
 from .context import LightContext
 from .parallel import CHUNK, parallel_for
 from .rays import offset_origins
@@ -57,7 +57,7 @@ class SurfaceCache:
         self.irradiance_sky = self.irradiance_emission = self.irradiance_direct = self.albedo = self.irradiance_rest = none
         self.choices, self.choice_weights = TexelLight.no_choices()
         self.smooth = np.ones((1, 1), bool)
-        self.bright: BrightSurfaces | None = None
+        self.bright = self._nothing_bright()
         self._first_bounce, self._solved = none, 0
         emitters, areas = context.emitters, context.geometry.areas
         wide = emitters.count and areas[emitters.primitive].sum(dtype=np.float64) > WIDE_EMITTERS * areas.sum(dtype=np.float64)
@@ -230,7 +230,7 @@ class SurfaceCache:
         parts = parallel_for(work, len(ends), context.threads, progress, "direct light on the surface cache")
         names = ("irradiance_sky", "irradiance_direct", "smooth", "choices", "choice_weights")
         for column, name in enumerate(names):
-            if column or world_changed:
+            if parts and (column or world_changed):
                 rows = [part[column] for part in parts]
                 setattr(other, name, np.concatenate([*rows, np.zeros((1, rows[0].shape[1]), rows[0].dtype)]))
         return other
@@ -238,8 +238,7 @@ class SurfaceCache:
     def state(self) -> dict[str, np.ndarray]:
         """Everything that was measured, for a checkpoint."""
         arrays = {f"table.{name}": value for name, value in self.table.state().items()}
-        if self.bright is not None:
-            arrays |= {f"bright.{name}": value for name, value in self.bright.state().items()}
+        arrays |= {f"bright.{name}": value for name, value in self.bright.state().items()}
         arrays |= {name: getattr(self, name) for name in (*_ROWS, "irradiance_rest")}
         widths = np.array([block.shape[1] for block in self.form_factors], np.int64)
         empty = np.zeros((self.rays, 0), np.int32)
@@ -251,7 +250,7 @@ class SurfaceCache:
         """Take up from ``state``."""
         self.table.restore({name.removeprefix("table."): value for name, value in arrays.items() if name.startswith("table.")})
         bright = {name.removeprefix("bright."): value for name, value in arrays.items() if name.startswith("bright.")}
-        self.bright = BrightSurfaces.restored(self.context, bright) if bright else None
+        self.bright = BrightSurfaces.restored(self.context, bright)
         for name in (*_ROWS, "irradiance_rest"):
             setattr(self, name, arrays[name])
         self._first_bounce, self._solved = arrays["first_bounce"], int(arrays["solved"])
@@ -267,7 +266,7 @@ class SurfaceCache:
         """
         if self._solved == self.count:
             return
-        if self.bright is None:
+        if self._solved == 0:
             slots, radiance = (self.table.slots, self._reflected()[:-1]) if bright else (self.table.slots[:0], self._reflected()[:0])
             self.bright = BrightSurfaces(self.context, self.layout, slots, radiance, self._light.radiance_at, self._seed)
             self._first_bounce = np.zeros((1, 3), np.float32)
@@ -278,6 +277,10 @@ class SurfaceCache:
                                    self.context.threads, progress)
         self.irradiance_rest = fixed + received
         self._solved = self.count
+
+    def _nothing_bright(self) -> BrightSurfaces:
+        none = np.zeros(0, np.int32)
+        return BrightSurfaces(self.context, self.layout, none, np.zeros((0, 3), np.float32), None, self._seed)
 
     def _reflected(self) -> np.ndarray:
         return self.albedo * self.irradiance_direct * np.float32(1 / np.pi)

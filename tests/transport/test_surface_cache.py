@@ -237,6 +237,20 @@ def test_seeds_give_other_noise():
     assert not np.array_equal(*values)
 
 
+def test_a_cache_that_no_ray_has_reached_is_solved_too():
+    """Then it goes on as if that had not been asked."""
+    scene, results = rooms.sun_patch_room(), []
+    for early in (True, False):
+        cache = prepared(scene)
+        if early:
+            cache.solve(None, 1e-5, Progress())
+            assert cache.count == 0 and not cache.irradiance_rest.any()
+        texel = solved(cache, surface_hits(cache))
+        assert cache.bright.count > 0
+        results.append(total(cache, texel))
+    np.testing.assert_array_equal(*results)
+
+
 def test_too_many_texels_are_refused_with_a_remedy():
     cache = prepared(build.closed_box(), size=0.05, max_texels=500)
     with pytest.raises(BakeError, match="texel size"):

@@ -67,15 +67,15 @@ def _by_settings(volumes: tuple[ProbeVolume, ...], settings: ProbeSettings):
 
 def _field(scene: Scene, settings: ProbeSettings, bakes: list[ProbeBake], grids) -> ProbeField:
     """The field of all bakes, in the order of the scene's volumes, with what it takes to relight it."""
-    by_name = {grid.volume.name: dilate(grid) for group in grids for grid in group}
+    by_volume = {id(grid.volume): dilate(grid) for group in grids for grid in group}
 
     def relit(other: Scene, progress: Progress) -> ProbeField:
-        return _field(other, settings, bakes, [relight(bake, other, progress) for bake in bakes])
+        return _field(scene, settings, bakes, [relight(bake, other, progress) for bake in bakes])
 
     stats = {"rays": int(sum(bake.ray_count + bake.cache.count * bake.cache.rays for bake in bakes)),
              "probe_rays": int(sum(bake.ray_count for bake in bakes)), "texels": int(sum(bake.cache.count for bake in bakes)),
              "texel_size": float(min(bake.cache.layout.size for bake in bakes))}
-    return ProbeField(tuple(by_name[volume.name] for volume in scene.volumes), includes_direct=settings.direct,
+    return ProbeField(tuple(by_volume[id(volume)] for volume in scene.volumes), includes_direct=settings.direct,
                       params=asdict(settings), stats=stats, relit=relit)
 
 
