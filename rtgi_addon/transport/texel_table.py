@@ -5,9 +5,9 @@ other, and a mean over the hidden strip beneath the wall would darken both. So a
 surface, from one point of the slot that a ray really reached (its seed). Where a slot's rim or interior is obstructed, each hit
 in it is tested against the seed, and those that do not see it make further texels with seeds of their own.
 
-What hangs close above a surface parts it just as well: the ceiling over a lamp's panel is the brightest spot of a room that no one
-sees, and the ceiling beside it must not share its light. So points with something less than a texel above them make one texel,
-points without another.
+Emitters that hang close above a surface part it just as well: the ceiling over a lamp's panel is the brightest spot of a room,
+which no one sees, and the ceiling beside it must not share its light. So points close under an emitter make one texel, points
+beside it another.
 """
 
 from dataclasses import dataclass
@@ -22,9 +22,12 @@ from .vectors import dot
 
 # A slot is split into at most this many texels; what none of their seeds sees joins the last.
 MAX_PARTS = 4
-# Segments between two points of a texel end this share short, so that rounding does not take the far end's own surface for a wall.
+# Segments between two points of a texel end this share short: rounding must not take the far end's own surface for a wall.
 # Much more, and a seed close to a wall would see both its sides.
 _SHORT = np.float32(1.0 - 1e-6)
+# A point is covered by an emitter less than this share of a texel's side above it. Light from higher up has soft edges, which
+# texels hold well enough.
+COVER = np.float32(0.5)
 # Sides of a cell's rim and diagonals, as pairs of corners.
 _RIM = np.array([(0, 1), (1, 2), (2, 3), (3, 4), (4, 0), (0, 2), (0, 3), (1, 4)])
 
@@ -45,12 +48,14 @@ class SurfaceHits:
     @staticmethod
     def join(parts: list["SurfaceHits"]) -> "SurfaceHits":
         """Several sets end to end."""
-        return SurfaceHits(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("primitive", "u", "v", "slots")))
+        names = ("primitive", "u", "v", "slots")
+        return SurfaceHits(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
 class TexelTable:
     """Grows by ``resolve``; rows are never moved. ``slots`` (n,) int32, ``seeds`` their SurfaceHits, ``mixed`` (n,) bool: the
-    slot is obstructed; ``accepted`` (n, points) bool: which of the slot's sample points see the seed and are covered like it.
+    slot is obstructed; ``covered`` (n,) bool: an emitter is close above the seed; ``accepted`` (n, points) bool: which
+    of the slot's sample points see the seed and are covered like it.
 
     ``sample_numbers(slots)`` returns (points, n, 2) numbers in [0, 1), the same ones whenever it is asked.
     """
@@ -62,6 +67,7 @@ class TexelTable:
         self.seeds = SurfaceHits(empty, np.zeros(0, np.float32), np.zeros(0, np.float32), empty)
         self._next = empty
         self.mixed = np.zeros(0, bool)
+        self.covered = np.zeros(0, bool)
         self.accepted = np.zeros((0, points), bool)
 
     @property
@@ -77,12 +83,13 @@ class TexelTable:
     def state(self) -> dict[str, np.ndarray]:
         """Everything in it, for a checkpoint."""
         return {"primitive": self.seeds.primitive, "u": self.seeds.u, "v": self.seeds.v, "slots": self.seeds.slots,
-                "next": self._next, "mixed": self.mixed, "accepted": self.accepted}
+                "next": self._next, "mixed": self.mixed, "covered": self.covered, "accepted": self.accepted}
 
     def restore(self, arrays: dict[str, np.ndarray]) -> None:
         """Take up from ``state``."""
         self.seeds = SurfaceHits(*(arrays[name] for name in ("primitive", "u", "v", "slots")))
-        self._next, self.mixed, self.accepted = arrays["next"], arrays["mixed"], arrays["accepted"]
+        self._next, self.mixed = arrays["next"], arrays["mixed"]
+        self.covered, self.accepted = arrays["covered"], arrays["accepted"]
         # Of the texels of one slot the first made stays.
         self._first[self.slots[::-1]] = np.arange(self.count, dtype=np.int32)[::-1]
 
@@ -97,10 +104,12 @@ class TexelTable:
             self._create(SurfaceHits.join([part.take(rows) for part, rows in zip(parts, fresh, strict=True)]), None)
         texels = [self._first[part.slots] for part in parts]
         open_rows = [np.flatnonzero(self.mixed[texel]) for texel in texels]
+        covered = parallel_for(lambda i: self._covered(parts[i].take(open_rows[i])), len(parts), threads)
         for _ in range(1, MAX_PARTS):
-            blocked = parallel_for(lambda i: self._blocked(parts[i].take(open_rows[i]), texels[i][open_rows[i]]),  # noqa: B023
-                                   len(parts), threads)
-            open_rows = [rows[hidden] for rows, hidden in zip(open_rows, blocked, strict=True)]
+            apart = parallel_for(lambda i: self._apart(parts[i].take(open_rows[i]), texels[i][open_rows[i]], covered[i]),  # noqa: B023
+                                 len(parts), threads)
+            open_rows = [rows[parted] for rows, parted in zip(open_rows, apart, strict=True)]
+            covered = [cover[parted] for cover, parted in zip(covered, apart, strict=True)]
             if not any(rows.size for rows in open_rows):
                 break
             missing = [rows[self._next[texel[rows]] < 0] for rows, texel in zip(open_rows, texels, strict=True)]
@@ -131,17 +140,19 @@ class TexelTable:
         self.seeds = SurfaceHits.join([self.seeds, seeds])
         self._next = np.concatenate([self._next, np.full(len(keys), -1, np.int32)])
         self.mixed = np.concatenate([self.mixed, mixed if after is None else np.ones(len(keys), bool)])
-        self.accepted = np.concatenate([self.accepted, *(part[1] for part in surveys)])
+        self.covered = np.concatenate([self.covered, *(part[1] for part in surveys)])
+        self.accepted = np.concatenate([self.accepted, *(part[2] for part in surveys)])
 
-    def _survey(self, seeds: SurfaceHits) -> tuple[np.ndarray, np.ndarray]:
-        """Whether each slot is obstructed, and which of its sample points (n, points) see the seed."""
+    def _survey(self, seeds: SurfaceHits) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Whether each slot is obstructed, whether its seed is covered, which of its sample points (n, points) belong to it."""
         n = len(seeds.slots)
         base, normal, lift = self._lifted(seeds)
         xi = self._numbers(seeds.slots)
         primitive, u, v = (part.reshape(-1) for part in self._layout.sample(seeds.slots, xi))
         samples = SurfaceHits(primitive, u, v, np.tile(seeds.slots, self._point_count))
         apart = self._segment(np.tile(base, (self._point_count, 1)), self._lifted(samples)[0])
-        apart |= self._covered(samples) != np.tile(self._covered(seeds), self._point_count)
+        covered = self._covered(seeds)
+        apart |= self._covered(samples) != np.tile(covered, self._point_count)
         accepted = ~apart.reshape(self._point_count, n).T
         mixed = ~accepted.all(axis=1)
         rows, _, corners = self._layout.rim(seeds.slots)
@@ -149,21 +160,28 @@ class TexelTable:
             corners = corners + (normal[rows] * lift[rows, None])[:, None, :]
             start, end = (np.swapaxes(corners[:, side], 0, 1).reshape(-1, 3) for side in _RIM.T)
             mixed[rows] |= self._segment(start, end).reshape(len(_RIM), len(rows)).any(axis=0)
-        return mixed, accepted
+        return mixed, covered, accepted
 
-    def _blocked(self, hits: SurfaceHits, texel: np.ndarray) -> np.ndarray:
-        if len(texel) == 0:
-            return np.zeros(0, bool)
-        seeds = self.seeds.take(texel)
-        return self._segment(self._lifted(hits)[0], self._lifted(seeds)[0]) | (self._covered(hits) != self._covered(seeds))
+    def _apart(self, hits: SurfaceHits, texel: np.ndarray, covered: np.ndarray) -> np.ndarray:
+        """(n,) bool: which hits, ``covered`` (n,) or not, do not belong to their ``texel`` (n,)."""
+        apart = covered != self.covered[texel]
+        alike = np.flatnonzero(~apart)
+        if alike.size:
+            apart[alike] = self._segment(self._lifted(hits.take(alike))[0], self._lifted(self.seeds.take(texel[alike]))[0])
+        return apart
 
     def _covered(self, hits: SurfaceHits) -> np.ndarray:
-        """(n,) bool: whether something is less than a texel above the surface."""
-        geometry = self._context.geometry
-        side = np.where(hits.slots & 1, np.float32(1), np.float32(-1))[:, None]
-        normal = geometry.normals_world[hits.primitive] * side
-        points = geometry.points(hits.primitive, hits.u, hits.v)
-        return self._context.tracer.occluded(offset_origins(points, normal, normal), normal, self._layout.sizes(hits.primitive))
+        """(n,) bool: whether an emitter is close above the surface."""
+        geometry, surfaces = self._context.geometry, self._context.surfaces
+        covered = np.zeros(len(hits.slots), bool)
+        if len(covered) and surfaces.has_emission:
+            side = np.where(hits.slots & 1, np.float32(1), np.float32(-1))[:, None]
+            normal = geometry.normals_world[hits.primitive] * side
+            points = offset_origins(geometry.points(hits.primitive, hits.u, hits.v), normal, normal)
+            above = self._context.tracer.intersect(points, normal, COVER * self._layout.sizes(hits.primitive)).primitive
+            rows = np.flatnonzero(above >= 0)
+            covered[rows] = surfaces.emissive[geometry.material[above[rows]]]
+        return covered
 
     def _lifted(self, hits: SurfaceHits):
         geometry = self._context.geometry

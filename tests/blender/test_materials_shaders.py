@@ -246,3 +246,14 @@ def test_transmission_passes_light_and_is_said(empty_blend):
     (read,), _mesh, reader, _loops = read_object(grid_object(material))
     assert 0.05 < float(read.alpha.constant[0]) < 0.15 and np.allclose(read.albedo.constant, 1.0, atol=1e-3)
     assert any("pass straight through" in note for note in reader.notes)
+
+
+def test_what_bends_diffuse_reflection_is_said(empty_blend):
+    material, node = new_principled(Base_Color=(0.5, 0.5, 0.5, 1.0), Diffuse_Roughness=0.7)
+    bump = material.node_tree.nodes.new("ShaderNodeBump")
+    material.node_tree.links.new(bump.outputs["Normal"], node.inputs["Normal"])
+    (read,), _mesh, reader, _loops = read_object(grid_object(material))
+    assert read.extraction == "nodes" and any("bumps are left out" in note for note in reader.notes)
+    assert any("Oren-Nayar" in note for note in reader.notes)
+    plain, _node = new_principled(Base_Color=(0.5, 0.5, 0.5, 1.0))
+    assert not read_object(grid_object(plain))[2].notes
