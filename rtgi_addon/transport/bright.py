@@ -15,8 +15,8 @@ from .texels import TexelLayout
 from .vectors import dot, luminance
 
 # Points in the pool, by which a patch's pattern of light and shadow is known.
-POOL = 1 << 14
-# Samples toward the pool from each texel.
+POOL = 1 << 15
+# Connections from each texel to the pool.
 TEXEL_SAMPLES = 16
 
 
@@ -85,25 +85,31 @@ class BrightSurfaces:
             self._radiance, self._density = arrays["radiance"], arrays["density"]
         return self
 
-    def connect(self, numbers: np.ndarray, points: np.ndarray, faces: np.ndarray | None):
-        """Join ``points`` (n, 3) to pool points picked by ``numbers`` (n,) in [0, 1).
+    def connect(self, numbers: np.ndarray, points: np.ndarray, per_light: float, per_ray: float,
+                receiver: tuple[np.ndarray, np.ndarray] | None = None):
+        """Join ``points`` (n, 3) to the pool, one connection each, by ``numbers`` (n,) in [0, 1).
 
-        Returns direction (n, 3), cosine·/distance² at the pool point (n,) [m⁻²], density (n,) [m⁻²] and radiance (n, 3), which is 0
-        where nothing arrives. ``faces`` (n, 3) are the receivers' face normals, or None in free space.
+        Returns unit directions (n, 3) and contributions (n, 3) = L·T·V / (per_light·p + per_ray·T): T is cosine·cosine/distance²
+        [m⁻²] and p the density of pool points, so this is the balance heuristic's share of what ``per_light`` connections and rays
+        of density ``per_ray``·T find together. ``receiver``: shading and face normals (n, 3), None in free space.
         """
-        pick = np.minimum((numbers * self.count).astype(np.int64), self.count - 1)
-        towards = self._points[pick] - points
+        pick = np.minimum((numbers * np.float32(self.count)).astype(np.int64), self.count - 1)
+        towards = np.take(self._points, pick, axis=0) - points
         squared = np.maximum(dot(towards, towards), np.float32(1e-20))
         distance = np.sqrt(squared)
         direction = towards / distance[:, None]
-        cosine = -dot(self._normals[pick], direction)
-        radiance = self._radiance[pick]
-        open_to = (cosine > 0) & (radiance[:, 0] + radiance[:, 1] + radiance[:, 2] > 0)
-        if faces is not None:
-            open_to &= dot(faces, direction) > 0
-        rows = np.flatnonzero(open_to)
-        start = points[rows] if faces is None else offset_origins(points[rows], faces[rows], direction[rows])
-        end = offset_origins(self._points[pick[rows]], self._normals[pick[rows]], -direction[rows])
-        seen = np.zeros(len(points), bool)
-        seen[rows] = ~self._context.tracer.occluded(start, end - start, np.full(len(rows), 1.0 - 1e-5, np.float32))
-        return direction, cosine / squared, self._density[pick], np.where(seen[:, None], radiance, np.float32(0))
+        radiance = np.take(self._radiance, pick, axis=0)
+        transfer = np.maximum(-dot(np.take(self._normals, pick, axis=0), direction), 0) / squared
+        transfer *= radiance[:, 0] + radiance[:, 1] + radiance[:, 2] > 0
+        if receiver is not None:
+            shading, face = receiver
+            transfer *= np.maximum(dot(shading, direction), 0) * (dot(face, direction) > 0)
+        rows = np.flatnonzero(transfer > 0)
+        pick, transfer = pick[rows], transfer[rows]
+        start = points[rows] if receiver is None else offset_origins(points[rows], receiver[1][rows], direction[rows])
+        end = offset_origins(self._points[pick], self._normals[pick], -direction[rows])
+        free = ~self._context.tracer.occluded(start, end - start, np.full(len(rows), 1.0 - 1e-5, np.float32))
+        share = transfer * free / (per_light * self._density[pick] + per_ray * transfer)
+        contribution = np.zeros((len(points), 3), np.float32)
+        contribution[rows] = radiance[rows] * share[:, None]
+        return direction, contribution

@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import BakeError
 from ..numerics.sampling import cosine_hemisphere, frame, hash_u32, sobol_owen
 from ..progress import Progress
-from .bright import TEXEL_CANDIDATES, TEXEL_SAMPLES, BrightSurfaces
+from .bright import TEXEL_SAMPLES, BrightSurfaces
 from .context import LightContext
 from .parallel import CHUNK, parallel_for
 from .rays import offset_origins
@@ -202,16 +202,15 @@ class SurfaceCache:
         _, _, _, points, shading, face = self.surface(texels, m)
         jitter = self.numbers(self.table.slots[texels], 4, 5, m)[..., 0]
         numbers = (np.arange(m, dtype=np.float32)[:, None] + jitter) / np.float32(m)
-        direction, at_light, density, radiance = self.bright.connect(numbers.reshape(-1), points, face)
-        transfer = np.maximum(dot(shading, direction), 0) * np.maximum(at_light, 0)
-        weight = transfer / np.maximum(m * density + self.rays * transfer / np.float32(np.pi), 1e-30)
-        return (radiance * weight[:, None]).reshape(m, n, 3).sum(axis=0)
+        _, irradiance = self.bright.connect(numbers.reshape(-1), points, m, self.rays / np.pi, (shading, face))
+        return irradiance.reshape(m, n, 3).sum(axis=0)
 
     def relight(self, context: LightContext, progress: Progress) -> "SurfaceCache":
         """The same texels and hits under other lamps and another world: no form-factor ray is traced again."""
         other = object.__new__(SurfaceCache)
         other.__dict__.update(self.__dict__)
-        other.context, other.sources, other.bright, other._solved = context, Sources(context), None, 0
+        other.context, other.sources, other._solved = context, Sources(context), 0
+        other.bright = other._nothing_bright()
         other._light = TexelLight(other)
         world_changed = context.environment is not self.context.environment
         ends = np.cumsum([block.shape[1] for block in self.form_factors])

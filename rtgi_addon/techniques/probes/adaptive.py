@@ -12,7 +12,7 @@ SLOPE = 0.7
 # One probe's difference is one sample of its error: lean on the mean of its neighbours by this share.
 POOLED = 0.5
 # Share of the target left to the sampling of probe rays; the rest is for the surface cache.
-SAMPLING_SHARE = 0.85
+SAMPLING_SHARE = 0.8
 # A round goes this share of the way that the last estimate asks for, so that an overestimate is noticed before it is paid for.
 STRIDE = 0.7
 

@@ -244,7 +244,8 @@ class Gatherer:
             # Each probe meets its own points of the pool, in the sequence's order.
             numbers = self._light_numbers(item, 1, 5) + _fraction(hash_u32(item.probes, self._seed, 5))[:, None]
             numbers = (numbers - np.floor(numbers)).reshape(-1)
-            total += self._balanced(item, surfaces.connect(numbers, self._origins(item, item.shape[1] // RAYS_PER_LIGHT_SAMPLE), None))
+            origins = self._origins(item, item.shape[1] // RAYS_PER_LIGHT_SAMPLE)
+            total += self._connected(item, *surfaces.connect(numbers, origins, 1 / RAYS_PER_LIGHT_SAMPLE, _UNIFORM_PDF))
         return total
 
     def bright_sky(self, item: Item) -> np.ndarray:
@@ -261,17 +262,14 @@ class Gatherer:
         n = item.shape[1] // RAYS_PER_LIGHT_SAMPLE
         if n == 0 or not self._sample_emitters:
             return np.float32(0)
-        return self._balanced(item, self._connect_emitters(self._light_numbers(item, 3, 4).reshape(-1, 3), self._origins(item, n),
-                                                           item.shape[2]))
+        xi = self._light_numbers(item, 3, 4).reshape(-1, 3)
+        return self._connected(item, *self._connect_emitters(xi, self._origins(item, n), item.shape[2]))
 
-    def _balanced(self, item: Item, connection) -> np.ndarray:
-        """Sums (g, m, k, 3) of connections by the balance heuristic over rays and samples together, both counted per ray."""
-        directions, at_light, density, emission = connection
+    def _connected(self, item: Item, directions: np.ndarray, contributions: np.ndarray) -> np.ndarray:
+        """Sums (g, m, k, 3) of connections from the item's probes, ordered like its light samples."""
         g, n, m = len(item.groups), item.shape[1] // RAYS_PER_LIGHT_SAMPLE, item.shape[2]
-        at_light = np.maximum(at_light, 0)
-        weight = at_light / np.maximum(_UNIFORM_PDF * at_light + density / RAYS_PER_LIGHT_SAMPLE, 1e-30)
         basis = np.ascontiguousarray(sh.evaluate(directions, self._order)).reshape(g, n, m, -1)
-        return np.matmul(basis.transpose(0, 2, 3, 1), (emission * weight[:, None]).reshape(g, n, m, 3).transpose(0, 2, 1, 3))
+        return np.matmul(basis.transpose(0, 2, 3, 1), contributions.reshape(g, n, m, 3).transpose(0, 2, 1, 3))
 
     def lamps(self, probes: np.ndarray) -> np.ndarray:
         """The direct light of lamps as SH coefficients (m, k, 3) of ``probes`` (m,)."""
@@ -285,15 +283,16 @@ class Gatherer:
         return result
 
     def _connect_emitters(self, xi: np.ndarray, origins: np.ndarray, m: int):
-        """As BrightSurfaces.connect, for emissive triangles: each sample is shared by m probes."""
+        """As BrightSurfaces.connect, for emissive triangles: directions and contributions, each sample shared by m probes."""
         target, normal, emission, pdf_area, _ = (np.repeat(part, m, axis=0) for part in self._context.emitters.sample(xi))
         towards = target - origins
         squared = np.maximum(dot(towards, towards), np.float32(1e-20))
         distance = np.sqrt(squared)
         directions = towards / distance[:, None]
         free = ~self._context.tracer.occluded(origins, directions, distance * np.float32(1 - 1e-4))
-        at_light = np.abs(dot(normal, directions)) / squared
-        return directions, at_light, pdf_area, np.where(free[:, None], emission, np.float32(0))
+        transfer = np.abs(dot(normal, directions)) / squared
+        share = transfer / np.maximum(pdf_area / RAYS_PER_LIGHT_SAMPLE + _UNIFORM_PDF * transfer, np.float32(1e-30))
+        return directions, np.where(free[:, None], emission * share[:, None], np.float32(0))
 
     def _visibility(self, item: Item, traced: Traced) -> tuple[np.ndarray, np.ndarray]:
         g, n, m = item.shape
