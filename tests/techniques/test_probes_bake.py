@@ -1,4 +1,4 @@
-"""The probe bake against closed forms and the path reference, and its promises: errors, bounces, threads, resuming, relighting.
+"""The probe bake against closed forms and the path reference, and its promises: errors, bounces, threads, resuming, placement.
 
 Coefficients are compared relative to their RMS over all probes. Seeds are fixed.
 """
@@ -9,47 +9,17 @@ import numpy as np
 import pytest
 import room_scenes as rooms
 import scene_builders as build
+from probe_bakes import QUICK, Memory, bake, bytes_of, coefficients, positions, rms
 
 from rtgi_addon.errors import BakeError, Cancelled, UsageError
-from rtgi_addon.numerics import grid as lattice
 from rtgi_addon.numerics import sh
 from rtgi_addon.progress import Progress
 from rtgi_addon.scene import SunLight
-from rtgi_addon.techniques.base import Checkpoint
-from rtgi_addon.techniques.probes import TECHNIQUE, ProbeSettings
 from rtgi_addon.techniques.probes import bake as bake_module
 from rtgi_addon.transport import path
 from rtgi_addon.transport.context import LightContext
 
 Y00 = np.sqrt(0.25 / np.pi)
-# Quick settings for everything but accuracy.
-QUICK = {"rays": 64, "cache_rays": 16, "texel_size": 0.25}
-
-
-def bake(scene, seed=0, threads=None, checkpoint=None, progress=None, **settings):
-    """The field of a bake with the given settings."""
-    return TECHNIQUE.bake(scene, ProbeSettings(**settings), np.random.default_rng(seed), progress or Progress(), threads=threads,
-                          checkpoint=checkpoint)
-
-
-def coefficients(field):
-    """SH (p, k, 3) float64 of all probes of all volumes."""
-    return np.concatenate([grid.sh.reshape(-1, *grid.sh.shape[3:]) for grid in field.grids()]).astype(float)
-
-
-def positions(scene):
-    return np.concatenate([lattice.lattice_points(volume.world_from_local, volume.resolution).reshape(-1, 3)
-                           for volume in scene.volumes])
-
-
-def rms(values):
-    return float(np.sqrt(np.mean(np.square(values))))
-
-
-def bytes_of(field):
-    return b"".join(np.asarray(value).tobytes() for _, value in sorted(field.arrays().items()))
-
-
 ACCURACY = {
     "closed box": build.closed_box(0.7, light_position=(0.3, -0.2, 0.5)),
     "emissive panel": rooms.panel_room(0.6),
@@ -197,24 +167,6 @@ def test_threads_do_not_change_a_byte(scene):
     assert bytes_of(bake(scene, seed=1, **QUICK)) != bytes_of(bake(scene, seed=2, **QUICK))
 
 
-class Memory(Checkpoint):
-    """Always due; keeps copies, and breaks off after ``stop`` saves."""
-
-    due = True
-
-    def __init__(self, stored=None, stop=None):
-        self.stored, self.stop, self.saves = dict(stored or {}), stop, 0
-
-    def save(self, name, arrays):
-        self.stored[name] = {key: np.array(value) for key, value in arrays.items()}
-        self.saves += 1
-        if self.saves == self.stop:
-            raise KeyboardInterrupt
-
-    def load(self, name):
-        return self.stored.get(name)
-
-
 @pytest.mark.parametrize("scene", [rooms.sun_patch_room(), rooms.panel_room(), rooms.courtyard()], ids=lambda scene: scene.name)
 def test_a_resumed_bake_ends_with_the_same_bytes(scene, monkeypatch):
     """Broken off after any of the first batches, half way and at the last one; two volumes with settings of their own."""
@@ -345,59 +297,3 @@ def test_a_volumes_own_setting_out_of_range_is_refused():
     volume = replace(build.volume(), settings={"order": 99})
     with pytest.raises(UsageError, match="order"):
         bake(replace(build.closed_box(), volumes=(volume,)), **QUICK)
-
-
-def relit_and_fresh(scene, other, **settings):
-    field = bake(scene, **settings)
-    return coefficients(field), coefficients(field.relight(other)), coefficients(bake(other, seed=9, **settings))
-
-
-def under_other_lamps(scene):
-    return replace(scene, lights=(build.point_light((-0.4, 0.5, 0.6), (0.3, 1.5, 2.0)),))
-
-
-@pytest.mark.parametrize("scene", [build.closed_box(0.6, light_position=(0.3, -0.2, 0.5)), rooms.textured_room(),
-                                   rooms.screen_room(),
-                                   replace(rooms.panel_room(emission=2.0), lights=(build.point_light(),))],
-                         ids=["box", "textures", "cut-outs", "with a panel"])
-def test_relighting_under_a_moved_and_recoloured_lamp(scene):
-    """A few per cent from a fresh bake of another seed, both at 2 %."""
-    before, relit, fresh = relit_and_fresh(scene, under_other_lamps(scene), error=0.02)
-    assert rms(relit - fresh) < 0.04 * rms(fresh) < rms(before - fresh)
-
-
-def test_relighting_under_another_world():
-    scene = rooms.courtyard()
-    before, relit, fresh = relit_and_fresh(scene, replace(scene, world=rooms.sunny_world(sun=50.0)), error=0.02)
-    assert rms(relit - fresh) < 0.04 * rms(fresh) < rms(before - fresh)
-
-
-def test_relighting_under_the_same_light_changes_little_and_nothing_of_the_first_field():
-    scene = rooms.panel_room()
-    field = bake(scene, error=0.03)
-    before = bytes_of(field)
-    assert rms(coefficients(field.relight(scene)) - coefficients(field)) < 0.01 * rms(coefficients(field))
-    assert bytes_of(field) == before
-
-
-def test_relighting_keeps_direct_light_and_bounces():
-    scene = build.closed_box(0.6, light_position=(0.3, -0.2, 0.5))
-    for settings in ({"direct": True}, {"bounces": 1}):
-        _, relit, fresh = relit_and_fresh(scene, under_other_lamps(scene), error=0.02, **settings)
-        assert rms(relit - fresh) < 0.04 * rms(fresh)
-
-
-def test_relighting_refuses_what_it_cannot_do():
-    scene = build.closed_box()
-    field = bake(scene, **QUICK)
-    moved = replace(scene, meshes=(rooms.moved(scene.meshes[0], (0.1, 0, 0)),))
-    with pytest.raises(BakeError, match="geometry"):
-        field.relight(moved)
-    painted = replace(scene, materials=(build.material("wall", 0.1),))
-    with pytest.raises(BakeError, match="material"):
-        field.relight(painted)
-    broken = Memory(stop=1)
-    with pytest.raises(KeyboardInterrupt):
-        bake(scene, checkpoint=broken, **QUICK)
-    with pytest.raises(BakeError, match="no hits"):
-        bake(scene, checkpoint=Memory(broken.stored), **QUICK).relight(scene)
