@@ -7,16 +7,21 @@ opened, extracted and baked as the command line does it, and some of its usable 
 Cycles. Differences are taken apart in three steps, each a relative RMSE of the SH coefficients at the same probes:
 
 - *Cycles*: the bake against Cycles on the file as it is. Signed bias (of the mean radiance) and the worst probe belong to it.
-- *matte*: the same, both sides anew, with every material's gloss, bumps and Oren-Nayar roughness taken away. What is left is what
-  extraction or transport get wrong; what went away is what diffuse transport cannot know.
+- *matte*: the same, both sides anew, with every material's gloss, bumps and Oren-Nayar roughness taken away. What is left is
+  what extraction or transport get wrong; what went away is what diffuse transport cannot know.
 - *path*: the bake against the path reference on the very Scene that was baked: what the bake alone gets wrong.
 
 The variance of every reference is subtracted. A file that has nothing to bake prints the product's own reason.
+
+Cycles' pixels find the small sun of an image by chance alone. With ``--world`` Cycles therefore renders what surfaces reflect
+and emit, and what a probe sees of the world itself is added from the path reference, which samples it (extraction's worlds are
+held to Cycles in the tests).
 """
 
 import argparse
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -34,6 +39,7 @@ from rtgi_addon.errors import BakeError  # noqa: E402
 from rtgi_addon.evaluate.metrics import relative_rmse, signed_bias  # noqa: E402
 from rtgi_addon.numerics import grid as lattice  # noqa: E402
 from rtgi_addon.progress import Progress  # noqa: E402
+from rtgi_addon.scene import Channel  # noqa: E402
 from rtgi_addon.scene.checks import check_scene, require  # noqa: E402
 from rtgi_addon.transport.context import LightContext  # noqa: E402
 from rtgi_addon.transport.path import probe_sh  # noqa: E402
@@ -50,12 +56,14 @@ def open_scene(path: Path, world: Path | None) -> None:
         return
     scene = bpy.context.scene
     scene.world = bpy.data.worlds.new("image")
-    scene.world.use_nodes = True
+    if bpy.app.version < (5, 0):
+        scene.world.use_nodes = True
     tree = scene.world.node_tree
     image = tree.nodes.new("ShaderNodeTexEnvironment")
     image.image = bpy.data.images.load(str(world))
     background = next(node for node in tree.nodes if node.bl_idname == "ShaderNodeBackground")
     tree.links.new(image.outputs["Color"], background.inputs["Color"])
+    scene.world.cycles_visibility.camera = False
 
 
 def make_matte() -> None:
@@ -127,6 +135,12 @@ def cycles(points: np.ndarray, noise: float, seconds: float) -> tuple[np.ndarray
             return mean, variance
 
 
+def world_seen(scene, points: np.ndarray) -> np.ndarray:
+    """SH (n, k, 3) of what ``points`` see of the world between the surfaces of ``scene``."""
+    dark = tuple(replace(material, emission=Channel.of(0.0)) for material in scene.materials)
+    return probe_sh(LightContext(replace(scene, materials=dark)), points, 2, 1 << 16, bounces=0, seed=7).mean
+
+
 def path_reference(scene, points: np.ndarray, noise: float, seconds: float) -> tuple[np.ndarray, np.ndarray]:
     """SH and variance at ``points`` by the path reference on the extracted ``scene``."""
     context, samples, started = LightContext(scene), 1024, time.perf_counter()
@@ -148,6 +162,8 @@ def measure(path: Path, options, say) -> str:
     points, chosen = choose(grids, options.probes)
     baked = coefficients(grids, chosen)
     reference, variance = cycles(points, options.noise, options.seconds)
+    world = 0.0 if options.world is None else world_seen(scene, points)
+    reference = reference + world
     worst = max(relative_rmse(baked[i:i + 1], reference[i:i + 1], variance[i:i + 1]) for i in range(len(baked)))
     bias = signed_bias(baked, reference)
     path_sh, path_variance = path_reference(scene, points, options.noise, options.seconds)
@@ -157,6 +173,7 @@ def measure(path: Path, options, say) -> str:
     make_matte()
     _, matte_grids, _ = bake()
     matte_reference, matte_variance = cycles(points, options.noise, options.seconds)
+    matte_reference = matte_reference + world
     matte = coefficients(matte_grids, chosen)
     matte_bias = signed_bias(matte, matte_reference)
     say(f"  matte: noise {_noise(matte_reference, matte_variance):.2%}, bias {matte_bias.value:+.2%}")

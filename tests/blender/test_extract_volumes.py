@@ -10,6 +10,7 @@ from mathutils import Euler, Matrix  # noqa: E402
 from rtgi_addon.blender.extract import extract_scene  # noqa: E402
 from rtgi_addon.blender.extract.volumes import fit_bounds, fit_resolution  # noqa: E402
 from rtgi_addon.errors import BakeError, UsageError  # noqa: E402
+from rtgi_addon.numerics.grid import lattice_points  # noqa: E402
 
 
 def box(name, size, location=(0, 0, 0)):
@@ -50,6 +51,17 @@ def test_volumes_by_name(empty_blend):
     assert [found.name for found in extract_scene(volumes=["c", "a"]).volumes] == ["c", "a"]
     with pytest.raises(UsageError, match=r"unknown probe volume 'd'.*a, b, c"):
         extract_scene(volumes=["a", "d"])
+
+
+@pytest.mark.parametrize("thickness", [0.0, 0.9], ids=["plane", "slab"])
+def test_fitted_to_bare_ground_it_reaches_into_the_air(empty_blend, thickness):
+    """Inside a slab, or under a plane, there is nothing to light."""
+    box("ground", (40, 30, thickness), (0, 0, -thickness / 2))
+    found, = extract_scene().volumes
+    top = found.world_from_local @ [0, 0, 1, 1]
+    assert top[2] == pytest.approx(4.0, rel=1e-5)
+    heights = lattice_points(found.world_from_local, found.resolution)[:, 0, 0, 2]
+    assert np.mean(heights > 0) >= 0.5
 
 
 def test_fitted_to_a_room_and_said_so(empty_blend):

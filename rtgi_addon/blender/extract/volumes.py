@@ -10,6 +10,8 @@ FEWEST_PROBES, MOST_PROBES = 64, 4096
 _TARGET_PROBES = 1024
 # How much further than everything else a flat object, or any object, reaches before the fit ignores it.
 _GROUND_REACH, _DOME_REACH = 4.0, 50.0
+# A scene lower than this share of its reach is ground without anything on it: the fit adds as much air above.
+_AIR = 0.1
 # Meshes placed more often than this are bounded by their boxes: cheap for forests, exact for rooms.
 _EXACT_USES = 4
 
@@ -43,14 +45,18 @@ def select_volumes(found: list[ProbeVolume], names: list[str] | None) -> list[Pr
 def fit_volume(meshes, instances, scene_name: str) -> ProbeVolume:
     """A volume around the scene's geometry: between 64 and 4,096 probes in near-cubic cells.
 
-    Ground planes and sky domes are not followed to their edges: see ``fit_bounds``. Cell-centred samples keep half a cell from
-    the box's sides, so none lies on an outer wall. Raises BakeError where there is no geometry to fit to.
+    Ground planes and sky domes are not followed to their edges: see ``fit_bounds``; bare ground gets some of the air above it.
+    Cell-centred samples keep half a cell from the box's sides, so none lies on an outer wall. Raises BakeError where there is no
+    geometry to fit to.
     """
     boxes = _world_boxes(meshes, instances)
     if not len(boxes):
         raise BakeError(f"scene {scene_name!r} has no Light Probe Volume and no visible geometry to fit one to",
                         "add a mesh or a Light Probe Volume, and check that it is not hidden from render")
     low, high = fit_bounds(boxes)
+    reach = float(np.max(high[:2] - low[:2]))
+    if high[2] - low[2] < _AIR * reach:
+        high = high + np.array([0.0, 0.0, _AIR * reach])
     size = np.maximum(high - low, max(0.01 * float(np.max(high - low)), 1e-3))
     world_from_local = np.diag([*(size / 2.0), 1.0])
     world_from_local[:3, 3] = (low + high) / 2.0
