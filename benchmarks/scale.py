@@ -66,7 +66,8 @@ def child(triangles: int, probes: int, rays: int) -> None:
     counted = sum(len(scene.meshes[instance.mesh].triangles) for instance in scene.instances)
     print("RESULT " + json.dumps({
         "triangles": counted, "probes": made, "rays": rays, "extract_seconds": extracted - started,
-        "bake_seconds": finished - extracted, "stages": summary.seconds, "peak_memory_bytes": summary.peak_memory_bytes}), flush=True)
+        "bake_seconds": finished - extracted, "stages": summary.seconds,
+        "peak_memory_bytes": summary.peak_memory_bytes}), flush=True)
 
 
 def main() -> None:

@@ -54,7 +54,7 @@ class ProbeGrid:
     @property
     def order(self) -> int:
         """SH order L."""
-        return int(round(np.sqrt(self.sh.shape[3]))) - 1
+        return round(np.sqrt(self.sh.shape[3])) - 1
 
     @property
     def usable(self) -> np.ndarray:

@@ -17,8 +17,9 @@ def solve_radiosity(form_factors: list[np.ndarray], source: np.ndarray, first_bo
     ``form_factors`` holds (R, nᵢ) int32 blocks of hit texels (−1: none) for consecutive texels; ``source`` (n + 1, 3) is the
     irradiance from elsewhere that is reflected in here; ``first_bounce`` (n + 1, 3) is what texels receive of light that was
     reflected once already; ``albedo`` (n + 1, 3); the last row of each is zero. The fixed point is
-    received = first_bounce + F·ρ(source + received). With ``bounces`` the series is cut after ``bounces`` − 1 passes; None iterates until the largest relative change falls below ``tolerance``, with Anderson's
-    extrapolation (Walker and Ni 2011, "Anderson acceleration for fixed-point iterations"), which changes the path, not the limit.
+    received = first_bounce + F·ρ(source + received). With ``bounces`` the series is cut after ``bounces`` − 1
+    passes; None iterates until the largest relative change falls below ``tolerance``, with Anderson's extrapolation
+    (Walker and Ni 2011, "Anderson acceleration for fixed-point iterations"), which changes the path, not the limit.
     """
     starts = np.concatenate(([0], np.cumsum([block.shape[1] for block in form_factors], dtype=np.int64)))
     reflect = (albedo / np.float32(np.pi)).astype(np.float32)

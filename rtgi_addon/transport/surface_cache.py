@@ -88,7 +88,7 @@ class SurfaceCache:
         parts = parallel_for(lambda i: self._trace(spans[i]), len(spans), self.context.threads, progress,
                              f"surface cache, {self.table.count:,} texels")
         resolved = self.table.resolve([part[0] for part in parts])
-        for (hits, found, density, *_), texel in zip(parts, resolved, strict=True):
+        for (_, found, density, *_), texel in zip(parts, resolved, strict=True):
             block = np.full(density.size, -1, np.int32)
             block[found] = texel
             self.form_factors.append(block.reshape(density.shape))
@@ -266,7 +266,8 @@ class SurfaceCache:
         if self._solved == self.count:
             return
         if self._solved == 0:
-            slots, radiance = (self.table.slots, self._reflected()[:-1]) if bright else (self.table.slots[:0], self._reflected()[:0])
+            looked_at = self.count if bright else 0
+            slots, radiance = self.table.slots[:looked_at], self._reflected()[:looked_at]
             self.bright = BrightSurfaces(self.context, self.layout, slots, radiance, self._light.radiance_at, self._seed)
             self._first_bounce = np.zeros((1, 3), np.float32)
         self.bright.cover(self.table.slots)

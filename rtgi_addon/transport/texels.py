@@ -140,8 +140,8 @@ class TexelLayout:
         return result
 
     def rim(self, slots: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Indices (m,) into ``slots`` of cells of large triangles, the triangle of each, and the corners (m, 5, 3) in world space of
-        what the triangle leaves of the cell, drawn a little inwards: what stands across a cell crosses its rim. Cells that the
+        """Indices (m,) into ``slots`` of cells of large triangles, the triangle of each, and the corners (m, 5, 3) in world space
+        of what the triangle leaves of the cell, drawn a little inwards: what stands across a cell crosses its rim. Cells that the
         long edge does not cut have one corner twice."""
         rows = np.flatnonzero(slots >> 1 >= self._group_count)
         triangle, a0, width, b0, height = self._cell(slots[rows] >> 1)

@@ -1,4 +1,4 @@
-"""The bake: place probes, trace in rounds, grow the surface cache with what the rays meet, stop each probe when it is good enough."""
+"""The bake: place probes, trace in rounds, grow the surface cache with what rays meet, stop each probe when it is good enough."""
 
 import time
 

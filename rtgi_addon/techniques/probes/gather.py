@@ -29,9 +29,9 @@ _UNIFORM_PDF = np.float32(1.0 / (4.0 * np.pi))
 
 @dataclass(frozen=True, eq=False)
 class Item:
-    """Blocks of ``count`` rays of some ``groups`` (g,), from ray ``first`` (g,) of each group's sequence, for as many of its probes:
-    ``probes`` (g, m). ``first`` and ``count`` are multiples of RAYS_PER_LIGHT_SAMPLE; a group may occur with several blocks. Rays
-    are ordered block by block, direction by direction: (g, n, m) with n = ``count``."""
+    """Blocks of ``count`` rays of some ``groups`` (g,), from ray ``first`` (g,) of each group's sequence, for as many of its
+    probes: ``probes`` (g, m). ``first`` and ``count`` are multiples of RAYS_PER_LIGHT_SAMPLE; a group may occur with several
+    blocks. Rays are ordered block by block, direction by direction: (g, n, m) with n = ``count``."""
 
     groups: np.ndarray
     probes: np.ndarray
@@ -98,7 +98,8 @@ class Gatherer:
         rows = np.flatnonzero(hits.primitive >= 0)
         primitive, u, v = hits.primitive[rows], hits.u[rows], hits.v[rows]
         front = dot(self._context.geometry.normals_world[primitive], rays[rows]) < 0
-        return Traced(SurfaceHits(primitive, u, v, self._cache.layout.slots(primitive, u, v, front)), rows, hits.t[rows], directions)
+        slots = self._cache.layout.slots(primitive, u, v, front)
+        return Traced(SurfaceHits(primitive, u, v, slots), rows, hits.t[rows], directions)
 
     def directions(self, item: Item) -> np.ndarray:
         """Directions (g·n, 3) that the probes of each group share."""
@@ -127,7 +128,7 @@ class Gatherer:
         return sobol_owen_at(index, dimensions, hash_u32(self._seed, item.groups, purpose)[:, None])
 
     def shade(self, item: Item, traced: Traced, texel: np.ndarray | None) -> Gathered:
-        """Radiance along the traced rays, projected. ``texel`` (h,) is the cache's for each hit, None where nothing is reflected."""
+        """Radiance along the traced rays, projected. ``texel`` (h,) is the cache's for each hit, None if nothing is reflected."""
         radiance = np.zeros((*item.shape, 3), np.float32)
         albedo = None
         if texel is not None:
@@ -228,8 +229,9 @@ class Gatherer:
         """(h, last − first): the sequences' further dimensions for the rays ``rows`` (h,), shifted on the torus for each probe."""
         probes = item.probe_of(rows)
         numbers = np.take(self._numbers(item, last, first).reshape(-1, last - first), rows // item.shape[2], axis=0)
+        every = np.arange(len(self._placement.positions))
         for d in range(first, last):
-            numbers[:, d - first] += np.take(_fraction(hash_u32(np.arange(len(self._placement.positions)), d, self._seed, 17)), probes)
+            numbers[:, d - first] += np.take(_fraction(hash_u32(every, d, self._seed, 17)), probes)
         return numbers - np.floor(numbers)
 
     def _light_samples(self, item: Item, reflected: bool) -> np.ndarray:
