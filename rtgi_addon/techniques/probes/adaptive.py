@@ -2,7 +2,8 @@
 
 An Owen-scrambled Sobol sequence errs like c·N^−slope. The estimates from its first N₁ and its next N₂ points are nearly
 independent, so their mean square difference is c²(N₁^−2s + N₂^−2s): that gives c, and with it the error of all N₁ + N₂ points
-and the number that a smaller error takes. The slope is the literature's (−.77 to −.81 measured on probes, PHYSICS.md §5), taken with caution.
+and the number that a smaller error takes. The slope is the literature's (−.77 to −.81 measured on probes, PHYSICS.md §5), taken
+with caution.
 """
 
 import numpy as np

@@ -25,7 +25,7 @@ BLOCK_RAYS = 64
 # Rays of one work item, and of all the items that are held in memory between tracing and shading.
 ITEM_RAYS, BATCH_RAYS = 1 << 16, 1 << 22
 # Texels that the surfaces around the probes are divided into at 1 % error; the number grows as the error falls.
-TEXELS = 24000
+TEXELS = 16000
 CACHE_RAYS = 64
 # Direct light that varies by less than this over a texel is taken from the texel, at 1 % error.
 SMOOTHNESS = 0.1
