@@ -1,11 +1,12 @@
 """Seconds against error: this bake and Cycles panoramas, for the same probes of the same .blend on the same machine in one run.
 
-    python benchmarks/bake_vs_cycles.py [samples…] [--probes 64 2048] [--quick] [--chart]
+    python benchmarks/bake_vs_cycles.py [samples…] [--probes 64 2048] [--method tiles|panorama] [--quick] [--chart]
 
 Both sides start from the open file and end with SH in memory, set-up included: for the bake that is extraction, BVH, surface
 cache and probes; for Cycles the time from the first render call, the file reopened before each measurement so that nothing is
-left over. Cycles renders as rtgi_addon/blender/cycles_reference.py does it, which is the fastest way found: the tiles of all
-probes in one picture, blue-noise sampling, light tree, no denoising and no path guiding (which made these scenes slower).
+left over. Cycles renders as rtgi_addon/blender/cycles_reference.py does it: by default the fastest way found, the tiles of all
+probes in one picture through an OSL camera, or with `--method panorama` as people do it today, one equirectangular render a
+probe. Blue-noise sampling, light tree, no denoising and no path guiding (which made these scenes slower).
 
 Where a render would take more than ten million paths, Cycles renders 256 probes, those of the reference among them, and the time
 beyond its set-up (a render of one probe with one sample) is scaled by the number of probes; on cornell_box that agrees with the
@@ -104,7 +105,7 @@ def measure_bake(name: str, probes: int, error: float, known: dict, threads: int
             "error": relative_rmse(baked, known["sh"], known["variance"])}
 
 
-def measure_cycles(name: str, probes: int, samples: int, known: dict, threads: int | None) -> dict:
+def measure_cycles(name: str, probes: int, samples: int, known: dict, options) -> dict:
     """Render the lattice, or a subset of it scaled up, from the open file; the error at the reference's points."""
     open_sample(name, probes)
     lattice = volume_points(bpy.context.scene)
@@ -113,12 +114,13 @@ def measure_cycles(name: str, probes: int, samples: int, known: dict, threads: i
     extra = (probes if probes * TILE**2 * samples <= FULL_PATHS else min(probes, SUBSET)) - len(chosen)
     if extra > 0:
         chosen = np.concatenate((chosen, others[np.linspace(0, len(others) - 1, extra).astype(int)]))
-    settings = CyclesSettings(resolution=TILE, samples=samples, bounces=BOUNCES, threads=threads)
+    common = {"resolution": TILE, "bounces": BOUNCES, "threads": options.threads, "method": options.method}
+    settings = CyclesSettings(samples=samples, **common)
     rendered = render_probes(lattice[chosen], settings)
     seconds, scaled = rendered["seconds"], len(chosen) < probes
     if scaled:
         open_sample(name, probes)
-        least = CyclesSettings(resolution=TILE, samples=1, bounces=BOUNCES, threads=threads)
+        least = CyclesSettings(samples=1, **common)
         set_up = render_probes(lattice[:1], least)["seconds"]
         seconds = set_up + (seconds - set_up) * probes / len(chosen)
     return {"setting": samples, "seconds": seconds, "rendered_probes": len(chosen), "scaled": scaled,
@@ -155,14 +157,14 @@ def compare(name: str, probes: int, options, say) -> dict:
             bake_errors.pop(0)
             say(f"  bake --error {ours[-1]['setting']:g}: {ours[-1]['seconds']:.2f} s, error {100 * ours[-1]['error']:.2f} %")
         if cycles_samples:
-            cycles.append(measure_cycles(name, probes, cycles_samples.pop(0), known, options.threads))
+            cycles.append(measure_cycles(name, probes, cycles_samples.pop(0), known, options))
             say(f"  Cycles {TILE}² × {cycles[-1]['setting']}: {cycles[-1]['seconds']:.2f} s"
                 f"{' (scaled)' if cycles[-1]['scaled'] else ''}, error {100 * cycles[-1]['error']:.2f} %")
             if cycles[-1]["error"] < options.at / 2:
                 cycles_samples.clear()
     (bake_seconds, bake_how), (cycles_seconds, cycles_how) = seconds_at(ours, options.at), seconds_at(cycles, options.at)
     noise = float(np.sqrt(known["variance"].sum() / np.square(known["sh"]).sum()))
-    return {"sample": name, "probes": probes, "at_error": options.at, "bake": ours, "cycles": cycles,
+    return {"sample": name, "probes": probes, "method": options.method, "at_error": options.at, "bake": ours, "cycles": cycles,
             "bake_seconds": bake_seconds, "bake_how": bake_how, "cycles_seconds": cycles_seconds, "cycles_how": cycles_how,
             "ratio": cycles_seconds / bake_seconds, "reference_standard_error": noise}
 
@@ -178,7 +180,7 @@ def chart(rows: list[dict], path: Path) -> None:
             points = sorted(row[key], key=lambda point: point["seconds"])
             axis.loglog([point["seconds"] for point in points], [100 * point["error"] for point in points], style, label=label)
         axis.axhline(100 * row["at_error"], color="grey", linewidth=0.8)
-        axis.set(title=f"{row['sample']}, {row['probes']:,} probes: {row['ratio']:.0f}×")
+        axis.set(title=f"{row['sample']}, {row['probes']:,} probes, {row['method']}: {row['ratio']:.0f}×")
         axis.set(xlabel="seconds", ylabel="relative RMSE [%]")
         axis.grid(True, which="both", alpha=0.25)
     axes[0, 0].legend()
@@ -188,9 +190,9 @@ def chart(rows: list[dict], path: Path) -> None:
 
 def table(rows: list[dict]) -> str:
     """The rows as Markdown."""
-    lines = ["| sample | probes | Cycles [s] | bake [s] | ratio |", "|---|---:|---:|---:|---:|"]
+    lines = ["| sample | probes | Cycles | Cycles [s] | bake [s] | ratio |", "|---|---:|---|---:|---:|---:|"]
     marks = {"interpolated": "", "extrapolated": " (extrapolated)", "at most": " (at most)"}
-    lines += [f"| {row['sample']} | {row['probes']:,} | {row['cycles_seconds']:.2f}{marks[row['cycles_how']]} | "
+    lines += [f"| {row['sample']} | {row['probes']:,} | {row['method']} | {row['cycles_seconds']:.2f}{marks[row['cycles_how']]} | "
               f"{row['bake_seconds']:.2f}{marks[row['bake_how']]} | {row['ratio']:.1f}× |" for row in rows]
     return "\n".join(lines)
 
@@ -200,6 +202,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("samples", nargs="*", metavar="sample", help=f"default: {' '.join(SAMPLES)}")
     parser.add_argument("--probes", type=int, nargs="+", default=[64, 2048], help="lattice sizes")
+    parser.add_argument("--method", choices=("tiles", "panorama"), default="tiles", help="how Cycles renders the probes")
     parser.add_argument("--at", type=float, default=0.01, help="error at which seconds are compared")
     parser.add_argument("--threads", type=int, help="threads for both sides (default: every core)")
     parser.add_argument("--repeats", type=int, default=3, help="runs of each bake, of which the median counts")
@@ -225,11 +228,11 @@ def main() -> int:
     rows = [compare(name, probes, options, say) for name in options.samples or SAMPLES for probes in options.probes]
     path = RESULTS / "bake_vs_cycles.json"
     earlier = json.loads(path.read_text())["rows"] if path.exists() else []
-    fresh = {(row["sample"], row["probes"]) for row in rows}
+    fresh = {(row["sample"], row["probes"], row["method"]) for row in rows}
     machine = {"cpu": platform.processor() or platform.machine(), "threads": options.threads or os.cpu_count(),
                "blender": bpy.app.version_string, "load_average": os.getloadavg()[0] if hasattr(os, "getloadavg") else None}
     rows = [dict(row, machine=row.get("machine", machine)) for row in
-            [row for row in earlier if (row["sample"], row["probes"]) not in fresh] + rows]
+            [row for row in earlier if (row["sample"], row["probes"], row["method"]) not in fresh] + rows]
     path.write_text(json.dumps({"schema": "rtgi-bake-vs-cycles/1", "rows": rows}, indent=1) + "\n")
     say(f"\nSeconds at {100 * options.at:g} % relative RMSE:\n{table(rows)}")
     if options.chart:
