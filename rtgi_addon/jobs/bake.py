@@ -12,6 +12,7 @@ from ..exchange.bundle import check_target, write_bundle
 from ..progress import Progress
 from ..scene import ProbeVolume, Scene
 from ..scene.checks import check_scene, require
+from ..transport.rays import slow_rays_warning
 from .checkpoint import FileCheckpoint
 from .fingerprint import fingerprint
 from .memory import peak_memory_bytes
@@ -50,7 +51,8 @@ def bake_scene(scene: Scene, technique: str = "probes", overrides: dict | None =
     scene = replace(scene, volumes=_select(scene.volumes, volume, overrides))
     findings = check_scene(scene, sh_order=getattr(settings, "order", 2))
     require(findings)
-    warnings = [str(finding) for finding in findings]
+    slow = slow_rays_warning()
+    warnings = [str(finding) for finding in findings] + ([slow] if slow else [])
 
     checkpoint = FileCheckpoint(target, fingerprint(scene, technique, settings, seed), resume=resume, interval=checkpoint_seconds)
     try:

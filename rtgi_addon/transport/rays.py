@@ -1,6 +1,6 @@
 """Rays against the scene's triangles through Embree, in chunks over every core.
 
-Without an embreex wheel ``make_tracer`` falls back to a tracer that was registered (Blender's BVH) or to the numpy twin.
+Without an embreex wheel ``make_tracer`` falls back to Blender's BVH, and outside Blender to the numpy twin.
 """
 
 from dataclasses import dataclass
@@ -48,27 +48,30 @@ class Tracer(Protocol):
         """(n,) bool: True where something lies between the origin and ``t_max`` (n,) (None: anywhere)."""
 
 
-_fallback_factories = []
-
-
-def register_fallback(factory) -> None:
-    """Offer ``factory(geometry) -> Tracer without alpha`` for platforms where embreex has no wheel."""
-    if factory not in _fallback_factories:
-        _fallback_factories.append(factory)
-
-
 def make_tracer(geometry: Geometry, surfaces: Surfaces | None = None, threads: int | None = None) -> Tracer:
     """The fastest tracer there is for ``geometry``; with ``surfaces``, one that honours alpha."""
-    if rtcore_scene is not None:
-        tracer = EmbreeTracer(geometry, threads)
-    elif _fallback_factories:
-        tracer = _fallback_factories[-1](geometry)
-    else:
-        from .brute_force import BruteForceTracer
-        tracer = BruteForceTracer(geometry)
+    tracer = EmbreeTracer(geometry, threads) if rtcore_scene is not None else _without_embree(geometry)
     if surfaces is not None and surfaces.has_transparency:
         return AlphaTracer(tracer, geometry, surfaces)
     return tracer
+
+
+def _without_embree(geometry: Geometry) -> Tracer:
+    from .brute_force import BruteForceTracer
+    from .bvh_tree import BVHTreeTracer
+    try:
+        return BVHTreeTracer(geometry)
+    except ImportError:  # mathutils comes with Blender alone
+        return BruteForceTracer(geometry)
+
+
+def slow_rays_warning() -> str | None:
+    """What to tell the user where rays do not go through Embree; None where they do."""
+    if rtcore_scene is not None:
+        return None
+    from .bvh_tree import SLOWER
+    return (f"there is no Embree here (the package embreex): rays go through Blender's BVH, which makes bakes some {SLOWER} times "
+            "slower, and more on many cores")
 
 
 class EmbreeTracer:
@@ -190,4 +193,4 @@ def offset_origins(points: np.ndarray, normals: np.ndarray, directions: np.ndarr
     return points + normals * np.where(side >= 0, step, -step)[:, None].astype(np.float32)
 
 
-__all__ = ["CHUNK", "AlphaTracer", "EmbreeTracer", "Hits", "Tracer", "make_tracer", "offset_origins", "register_fallback"]
+__all__ = ["CHUNK", "AlphaTracer", "EmbreeTracer", "Hits", "Tracer", "make_tracer", "offset_origins", "slow_rays_warning"]

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scene_builders as build
+from triangle_soups import assert_same_hits, rays, soup
 
 from rtgi_addon.errors import BakeError
 from rtgi_addon.numerics.sampling import fibonacci_sphere
@@ -15,31 +16,6 @@ from rtgi_addon.transport.rays import AlphaTracer, EmbreeTracer, make_tracer, of
 from rtgi_addon.transport.surfaces import Surfaces
 
 embreex = pytest.importorskip("embreex", reason="there is no Embree wheel for this platform")
-
-
-def soup(triangles=300, seed=0, scale=1.0):
-    rng = np.random.default_rng(seed)
-    centres = rng.uniform(-1, 1, (triangles, 1, 3))
-    corners = (centres + rng.normal(scale=0.25, size=(triangles, 3, 3))) * scale
-    return build.scene([build.mesh("soup", corners.reshape(-1, 3), np.arange(3 * triangles).reshape(-1, 3))])
-
-
-def rays(n, seed=1, scale=1.0):
-    rng = np.random.default_rng(seed)
-    directions = rng.normal(size=(n, 3)) * rng.uniform(0.2, 3.0, (n, 1))
-    return rng.uniform(-2, 2, (n, 3)).astype(np.float32) * np.float32(scale), directions.astype(np.float32)
-
-
-def assert_same_hits(hits, oracle, scale=1.0):
-    """The same triangle and distance; where two triangles meet at one distance, either will do, and no ray falls through."""
-    assert np.array_equal(hits.primitive >= 0, oracle.primitive >= 0)
-    found = oracle.primitive >= 0
-    np.testing.assert_allclose(hits.t[found], oracle.t[found], rtol=2e-5, atol=2e-6 * scale)
-    assert np.all(np.isinf(hits.t[~found])) and np.all(hits.primitive[~found] == -1)
-    same = hits.primitive[found] == oracle.primitive[found]
-    assert same.mean() > 0.999
-    for name in ("u", "v"):
-        np.testing.assert_allclose(getattr(hits, name)[found][same], getattr(oracle, name)[found][same], atol=2e-3)
 
 
 @pytest.mark.parametrize("seed", range(4))
