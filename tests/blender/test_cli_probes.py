@@ -24,9 +24,9 @@ def start(*words):
                             stdout=subprocess.PIPE, stderr=subprocess.PIPE)
 
 
-def bake(out, *words):
-    """Bake cornell_box to ``out``; the summary."""
-    process = start(CORNELL, "bake", "--out", out, "--json", *words)
+def bake(out, *words, file=CORNELL):
+    """Bake ``file`` to ``out``; the summary."""
+    process = start(file, "bake", "--out", out, "--json", *words)
     text, err = process.communicate(timeout=300)
     assert process.returncode == 0, err
     return json.loads(text)
@@ -48,6 +48,29 @@ def test_a_blend_becomes_a_bundle_with_light_in_it(tmp_path):
     assert grid.order == 2 and grid.usable.mean() > 0.9
     assert (grid.sh[grid.usable][:, 0] > 0).all()
     assert np.isfinite(grid.standard_error[grid.usable]).all()
+
+
+def test_overrides_saved_on_a_volume_are_kept_unless_the_command_line_says_otherwise(tmp_path):
+    program = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import bpy, rtgi_addon
+rtgi_addon.register()
+bpy.ops.wm.open_mainfile(filepath=sys.argv[2])
+(volume,) = (probe for probe in bpy.data.lightprobes if probe.type == "VOLUME")
+volume.rtgi.technique_probes.override_order = True
+volume.rtgi.technique_probes.order = 1
+bpy.ops.wm.save_as_mainfile(filepath=sys.argv[3])
+"""
+    file = tmp_path / "overridden.blend"
+    subprocess.run([sys.executable, "-c", program, str(ROOT), str(CORNELL), str(file)], check=True, capture_output=True)
+    bake(tmp_path / "overridden", "--rays", "32", file=file)
+    bake(tmp_path / "first", "--rays", "32", "--order", "1")
+    (own,), (first,) = read_bundle(tmp_path / "overridden").grids, read_bundle(tmp_path / "first").grids
+    assert len(list((tmp_path / "overridden").rglob("sh*.exr"))) == 4
+    assert own.order == 1 and np.array_equal(own.sh, first.sh)
+    bake(tmp_path / "stronger", "--rays", "32", "--order", "3", file=file)
+    assert read_bundle(tmp_path / "stronger").grids[0].order == 3
 
 
 def test_the_seed_decides_the_bytes_and_the_threads_do_not(tmp_path):

@@ -6,6 +6,7 @@ import sys
 import traceback
 from argparse import Namespace
 from collections.abc import Callable
+from contextlib import ExitStack
 
 from ...errors import BakeError, Cancelled, UsageError
 from ...jobs.console import ConsoleProgress
@@ -33,11 +34,13 @@ def main_module(argv: list[str]) -> int:
         if takes_scene and (file is None) == (arguments.imported is None):
             raise UsageError(f"{arguments.subcommand} needs one file", "name a .blend, .glb or .gltf before it")
 
-    def read(arguments: Namespace) -> None:
-        from .open_file import open_file
-        open_file(file or arguments.imported)
+    with ExitStack() as stack:
+        def read(arguments: Namespace) -> None:
+            from .open_file import known_properties, open_file
+            stack.enter_context(known_properties())
+            open_file(file or arguments.imported)
 
-    return _run(rest, "python -m rtgi_addon [FILE]", read, require_file)
+        return _run(rest, "python -m rtgi_addon [FILE]", read, require_file)
 
 
 def main_blender(argv: list[str]) -> int:

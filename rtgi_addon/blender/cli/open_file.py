@@ -2,13 +2,30 @@
 
 import re
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
 
 from ...errors import BakeError
+from .. import properties
 
 _GLTF = (".glb", ".gltf")
+
+
+@contextmanager
+def known_properties() -> Iterator[None]:
+    """Register the add-on's properties, through which volumes' overrides are read, for as long as the add-on itself is not
+    enabled: in Blender as a Python module it never is."""
+    if hasattr(bpy.types.LightProbe, "rtgi"):
+        yield
+        return
+    try:
+        properties.register()
+        yield
+    finally:
+        properties.unregister()
 
 
 def open_file(name: str) -> None:
