@@ -24,7 +24,8 @@ from .settings import ProbeSettings
 BLOCK_RAYS = 64
 # Rays of one work item, and of all the items that are held in memory between tracing and shading.
 ITEM_RAYS, BATCH_RAYS = 1 << 16, 1 << 22
-# Texels that the surfaces around the probes are divided into at 1 % error; the number grows as the error falls.
+# Texels that the surfaces around the probes are divided into at 1 % error; the number grows as the error falls, and falls more
+# slowly as it grows: a coarse bake has few rays to average the texels' noise.
 TEXELS = 16000
 CACHE_RAYS = 64
 # Direct light that varies by less than this over a texel is taken from the texel, at 1 % error.
@@ -46,9 +47,9 @@ class ProbeBake:
         self.placement: Placement = place(context, volumes, settings.virtual_offset, progress.span(0.0, 0.02))
         self._check_placement()
         refine = settings.target / 0.01
-        size = settings.texel_size or texel_size(context, volumes, TEXELS / refine)
+        size = settings.texel_size or texel_size(context, volumes, TEXELS / min(refine, np.sqrt(refine)))
         layout = TexelLayout(context.geometry, Focus(*focus(volumes), size))
-        rays = settings.cache_rays or int(np.clip(CACHE_RAYS * 2 ** round(np.log2(1.0 / refine)), 16, 1024))
+        rays = settings.cache_rays or int(np.clip(CACHE_RAYS * 2 ** round(np.log2(1.0 / refine)), 32, 1024))
         self.cache = SurfaceCache(context, layout, seed, rays, smoothness=float(np.clip(SMOOTHNESS * refine, 0.01, 0.2)))
         self.gatherer = Gatherer(context, self.cache, self.placement, settings, seed)
         count = len(self.placement.positions)
