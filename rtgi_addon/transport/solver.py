@@ -58,21 +58,22 @@ class _Anderson:
     """Type-II Anderson mixing, each colour channel on its own."""
 
     def __init__(self):
-        self._points, self._images = [], []
+        self._residuals, self._images, self._last = [], [], None
 
     def step(self, point: np.ndarray, image: np.ndarray) -> np.ndarray:
-        self._points = [*self._points[-_MEMORY:], point]
-        self._images = [*self._images[-_MEMORY:], image]
-        if len(self._points) < 2:
+        # Channel by channel in memory: BLAS wants its rows contiguous.
+        image_rows = np.ascontiguousarray(image.T, np.float64)
+        residual = image_rows - point.T
+        last, self._last = self._last, (residual, image_rows)
+        if last is None:
             return image
-        residuals = np.stack([b - a for a, b in zip(self._points, self._images, strict=True)]).astype(np.float64)
-        images = np.stack(self._images)
-        result = np.empty_like(image)
-        for channel in range(image.shape[1]):
-            steps = np.diff(residuals[:, :, channel], axis=0)
-            gram = steps @ steps.T
-            gram[np.diag_indices_from(gram)] += 1e-10 * np.trace(gram) + 1e-300
-            weights = np.linalg.solve(gram, steps @ residuals[-1, :, channel])
-            result[:, channel] = image[:, channel] - weights @ np.diff(images[:, :, channel], axis=0)
+        self._residuals = [*self._residuals[1 - _MEMORY:], residual - last[0]]
+        self._images = [*self._images[1 - _MEMORY:], image_rows - last[1]]
+        steps, images = np.stack(self._residuals, axis=1), np.stack(self._images, axis=1)
+        gram = steps @ steps.transpose(0, 2, 1)
+        diagonal = np.arange(gram.shape[1])
+        gram[:, diagonal, diagonal] += 1e-10 * np.trace(gram, axis1=1, axis2=2)[:, None] + 1e-300
+        weights = np.linalg.solve(gram, steps @ residual[:, :, None])
+        result = (image_rows - (weights.transpose(0, 2, 1) @ images)[:, 0]).T
         # A negative radiance can only come from extrapolating too far: such entries keep the plain step.
         return np.where(result >= 0, result, image).astype(np.float32)

@@ -1,6 +1,7 @@
 """The bake: place probes, trace in rounds, grow the surface cache with what rays meet, stop each probe when it is good enough."""
 
 import time
+from functools import cached_property
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from ...scene import ProbeVolume
 from ...transport.context import LightContext
 from ...transport.parallel import parallel_for
 from ...transport.surface_cache import SurfaceCache
+from ...transport.texel_light import ALL_SOURCES
 from ...transport.texels import Focus, TexelLayout
 from ..base import Checkpoint, ProbeGrid
 from .adaptive import FIRST_ROUND, SAMPLING_SHARE, STRIDE, ErrorModel, ladder
@@ -28,6 +30,8 @@ ITEM_RAYS, BATCH_RAYS = 1 << 16, 1 << 22
 # slowly as it grows: a coarse bake has few rays to average the texels' noise.
 TEXELS = 16000
 CACHE_RAYS = 64
+# So many times more where lamps are too many for shadow rays at every hit, and texels hold their light.
+MANY_LAMPS = 3.0
 # Direct light that varies by less than this over a texel is taken from the texel, at 1 % error.
 SMOOTHNESS = 0.1
 
@@ -47,7 +51,8 @@ class ProbeBake:
         self.placement: Placement = place(context, volumes, settings.virtual_offset, progress.span(0.0, 0.02))
         self._check_placement()
         refine = settings.target / 0.01
-        size = settings.texel_size or texel_size(context, volumes, TEXELS / min(refine, np.sqrt(refine)))
+        texels = TEXELS / min(refine, np.sqrt(refine)) * (MANY_LAMPS if context.lamps.count > ALL_SOURCES else 1.0)
+        size = settings.texel_size or texel_size(context, volumes, texels)
         layout = TexelLayout(context.geometry, Focus(*focus(volumes), size))
         rays = settings.cache_rays or int(np.clip(CACHE_RAYS * 2 ** round(np.log2(1.0 / refine)), 32, 1024))
         self.cache = SurfaceCache(context, layout, seed, rays, smoothness=float(np.clip(SMOOTHNESS * refine, 0.01, 0.2)))
@@ -216,7 +221,7 @@ class ProbeBake:
     def cut(self, coefficients: np.ndarray, error: np.ndarray) -> tuple[ProbeGrid, ...]:
         """Grids of the volumes from ``coefficients`` (p, k, 3) and ``error`` (p,) of all probes."""
         side = self.settings.visibility_resolution
-        visibility = self._visibility()
+        visibility = self._visibility
         result, start = [], 0
         for volume in self.volumes:
             shape = tuple(reversed(volume.resolution))
@@ -228,12 +233,14 @@ class ProbeBake:
                 error[span].reshape(shape)))
         return tuple(result)
 
+    @cached_property
     def _visibility(self) -> np.ndarray:
-        """Mean and mean squared distance (p, T², 2); a cell that no ray fell into takes a mean of the cells around it."""
+        """Mean and mean squared distance (p, T², 2) after the last round; a cell that no ray fell into takes a mean of those around
+        it."""
         directions = octahedral.texel_directions(self.settings.visibility_resolution).reshape(-1, 3)
         around = (np.maximum(directions @ directions.T, 0) ** 64 * 1e-4).astype(np.float32)
         weight = self._distance_weight + self._distance_weight @ around
-        sums = self._distance + np.einsum("tu,puc->ptc", around, self._distance)
+        sums = self._distance + np.matmul(around, self._distance)
         return sums / np.maximum(weight, 1e-30)[:, :, None]
 
 

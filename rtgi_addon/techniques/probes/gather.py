@@ -5,6 +5,7 @@ points find the same part of the BVH. Groups are scrambled independently of one 
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -47,6 +48,20 @@ class Item:
     def ray_count(self) -> int:
         """Rays in the item."""
         return self.probes.size * self.count
+
+    @cached_property
+    def _runs(self) -> np.ndarray:
+        # Blocks of the same probes follow one another.
+        return np.flatnonzero(np.append(True, (np.diff(self.groups) != 0) | (np.diff(self.probes[:, 0]) != 0)))
+
+    @property
+    def merged_probes(self) -> np.ndarray:
+        """The probes (b, m) that ``merged`` sums belong to, each once."""
+        return self.probes[self._runs]
+
+    def merged(self, part: np.ndarray) -> np.ndarray:
+        """Sums (b, …) of ``part`` (g, …) over the blocks of the same probes."""
+        return np.add.reduceat(part, self._runs, axis=0)
 
     def probe_of(self, rows: np.ndarray) -> np.ndarray:
         """The probe (h,) that each of the rays ``rows`` (h,) leaves from."""
@@ -145,14 +160,8 @@ class Gatherer:
             radiance.reshape(-1, 3)[traced.rows] = self._emitted(item, traced)
             emitted = project(basis, radiance) * np.float32(4.0 * np.pi) + self._emitter_samples(item)
             total = total + emitted
-        # Blocks of the same probes follow one another.
-        first = np.flatnonzero(np.append(True, (np.diff(item.groups) != 0) | (np.diff(item.probes[:, 0]) != 0)))
-
-        def merged(part):
-            return np.add.reduceat(part, first, axis=0)
-
-        return Gathered(item.probes[first], merged(total), None if emitted is None else merged(emitted), albedo,
-                        *(merged(part) for part in self._visibility(item, traced)))
+        return Gathered(item.merged_probes, item.merged(total), None if emitted is None else item.merged(emitted), albedo,
+                        *(item.merged(part) for part in self._visibility(item, traced)))
 
     def basis(self, item: Item, directions: np.ndarray) -> np.ndarray:
         """SH basis (g, n, k) of directions (g·n, 3)."""

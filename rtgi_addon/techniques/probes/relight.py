@@ -11,16 +11,18 @@ from ...transport.parallel import parallel_for
 from ..base import ProbeGrid
 from .gather import project
 
-# Hits of this many rays are kept (4 bytes each, and 6 more where albedo varies within triangles).
+# Hits of this many rays are kept: 4 bytes each, 1.5 to 12 for the direction that neighbouring probes share, and 6 more where
+# albedo varies within triangles.
 MAX_KEPT_RAYS = 1 << 25
 
 
 @dataclass(frozen=True, eq=False)
 class _Kept:
-    """An item's memory: the texel (g, n, m) of each ray, and the albedo there (g, n, m, 3) float16 or None where the texel's
-    will do."""
+    """An item's memory: the shared directions (g·n, 3), the texel (g, n, m) of each ray, and the albedo there (g, n, m, 3)
+    float16 or None where the texel's will do."""
 
     item: object
+    directions: np.ndarray
     texel: np.ndarray
     albedo: np.ndarray | None
 
@@ -49,7 +51,7 @@ class HitMemory:
             albedo = np.zeros((item.ray_count, 3), np.float16)
             albedo[traced.rows] = gathered.albedo
             albedo = albedo.reshape(*item.shape, 3)
-        self.items.append(_Kept(item, whole.reshape(item.shape), albedo))
+        self.items.append(_Kept(item, traced.directions, whole.reshape(item.shape), albedo))
 
 
 def relight(bake, scene: Scene, progress: Progress) -> tuple[ProbeGrid, ...]:
@@ -75,19 +77,21 @@ def relight(bake, scene: Scene, progress: Progress) -> tuple[ProbeGrid, ...]:
 
     def work(i):
         kept = bake.memory.items[i]
-        directions = gatherer.directions(kept.item)
         radiance = np.take(reflected if kept.albedo is not None else by_texel, kept.texel, axis=0, mode="wrap")
         if kept.albedo is not None:
             radiance[..., :3] *= kept.albedo
         if not context.environment.is_black:
-            sky = context.environment.base_radiance(directions).reshape(*kept.item.shape[:2], 1, 3)
-            radiance[..., :3] += np.where((kept.texel < 0)[..., None], sky, np.float32(0))
-        projected = project(gatherer.basis(kept.item, directions), radiance)[..., :3] * np.float32(4.0 * np.pi)
-        return projected + gatherer.bright_sky(kept.item) if context.environment.bright.count else projected
+            escaped = np.flatnonzero(kept.texel.reshape(-1) < 0)
+            sky = context.environment.base_radiance(kept.directions)
+            radiance.reshape(-1, 4)[escaped, :3] = np.take(sky, escaped // kept.item.shape[2], axis=0)
+        projected = project(gatherer.basis(kept.item, kept.directions), radiance)[..., :3] * np.float32(4.0 * np.pi)
+        if context.environment.bright.count:
+            projected = projected + gatherer.bright_sky(kept.item)
+        return kept.item.merged(projected)
 
     parts = parallel_for(work, len(bake.memory.items), context.threads, progress.span(0.7, 1.0), "relighting probes")
     for kept, part in zip(bake.memory.items, parts, strict=True):
-        np.add.at(sums, kept.item.probes, part)
+        sums[kept.item.merged_probes] += part
     if bake.emitted is not None:
         sums += bake.emitted
     coefficients = sums / np.maximum(bake.model.rays, 1)[:, None, None]
