@@ -29,4 +29,4 @@ class ProbeSettings:
     @property
     def target(self) -> float:
         """The error that the surface cache aims at: the target itself, or what a fixed number of rays usually reaches."""
-        return self.error if self.rays is None else min(max(0.3 * self.rays**-0.5, 1e-4), 0.05)
+        return self.error if self.rays is None else min(max(0.3 * self.rays**-0.5, 0.003), 0.05)
