@@ -14,11 +14,12 @@ from ..numerics.sampling import cosine_hemisphere, frame, hash_u32, sobol_owen
 from ..progress import Progress
 from .bright import TEXEL_SAMPLES, BrightSurfaces
 from .context import LightContext
+from .light_changes import FEW_CHANGES, changed_sources
 from .parallel import CHUNK, parallel_for
 from .rays import offset_origins
 from .solver import solve_radiosity
 from .sources import Sources
-from .texel_light import TexelLight
+from .texel_light import ALL_SOURCES, TexelLight
 from .texel_table import SurfaceHits, TexelTable
 from .texels import TexelLayout
 from .vectors import dot
@@ -206,33 +207,49 @@ class SurfaceCache:
         return irradiance.reshape(m, n, 3).sum(axis=0)
 
     def relight(self, context: LightContext, progress: Progress) -> "SurfaceCache":
-        """The same texels and hits under other lamps and another world: no form-factor ray is traced again."""
+        """The same texels and hits under other lamps and another world, for ``solve`` with ``bright`` False: no form-factor ray is
+        traced again. Direct light is known as its mean over each texel alone: ``smooth`` is True throughout."""
         other = object.__new__(SurfaceCache)
         other.__dict__.update(self.__dict__)
         other.context, other.sources, other._solved = context, Sources(context), 0
         other.bright = other._nothing_bright()
         other._light = TexelLight(other)
+        other.smooth = np.ones_like(self.smooth)
         world_changed = context.environment is not self.context.environment
+        gone, came = changed_sources(self.context, context)
+        few = other.sources.count > ALL_SOURCES and len(gone) + len(came) <= FEW_CHANGES
         ends = np.cumsum([block.shape[1] for block in self.form_factors])
 
         def work(i):
             texels = np.arange(ends[i] - self.form_factors[i].shape[1], ends[i])
             surface = self.surface(texels, self.points if world_changed else self.lamp_samples)
-            sky = None
+            sky = self.irradiance_sky[texels]
             if world_changed:
                 shading, face = (np.tile(part, (RAYS_PER_POINT, 1)) for part in surface[4:])
                 directions = self._directions(self.table.slots[texels], shading)[0]
                 escaped = (self.form_factors[i].reshape(-1) < 0) & (dot(face, directions) > 0)
                 sky = other._sky(directions, np.flatnonzero(escaped), len(texels))
-            return (sky, *other._light.direct(texels, surface))
+            if not few:
+                return sky, other._light.direct(texels, surface)[0]
+            direct = self.irradiance_direct[texels]
+            direct = direct + other._mean_light(other.sources, came, texels, surface)
+            return sky, direct - other._mean_light(self.sources, gone, texels, surface)
 
         parts = parallel_for(work, len(ends), context.threads, progress, "direct light on the surface cache")
-        names = ("irradiance_sky", "irradiance_direct", "smooth", "choices", "choice_weights")
-        for column, name in enumerate(names):
-            if parts and (column or world_changed):
-                rows = [part[column] for part in parts]
-                setattr(other, name, np.concatenate([*rows, np.zeros((1, rows[0].shape[1]), rows[0].dtype)]))
+        none = np.zeros((1, 3), np.float32)
+        other.irradiance_sky, other.irradiance_direct = (
+            np.concatenate([*(part[column] for part in parts), none]) for column in range(2))
         return other
+
+    def _mean_light(self, sources: Sources, chosen: list[int], texels: np.ndarray, surface) -> np.ndarray:
+        """Mean direct irradiance (n, 3) of the ``chosen`` of ``sources`` over the first points of ``surface``."""
+        samples, n = self.lamp_samples, len(texels)
+        points, shading, face = (part[:samples * n] for part in surface[3:])
+        uv = self.numbers(self.table.slots[texels], 4, 6, samples).reshape(-1, 2)
+        light = np.zeros((samples * n, 3), np.float32)
+        for source in chosen:
+            light += sources.irradiance(source, points, shading, face, np.zeros(len(points), np.float32), uv)
+        return light.reshape(samples, n, 3).mean(axis=0)
 
     def state(self) -> dict[str, np.ndarray]:
         """Everything that was measured, for a checkpoint."""
