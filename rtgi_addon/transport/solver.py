@@ -61,7 +61,7 @@ class _Anderson:
         self._residuals, self._images, self._last = [], [], None
 
     def step(self, point: np.ndarray, image: np.ndarray) -> np.ndarray:
-        # Channel by channel in memory: BLAS wants its rows contiguous.
+        # Channel by channel in memory, for contiguous rows; products by einsum, since BLAS would start threads for so few rows.
         image_rows = np.ascontiguousarray(image.T, np.float64)
         residual = image_rows - point.T
         last, self._last = self._last, (residual, image_rows)
@@ -70,10 +70,10 @@ class _Anderson:
         self._residuals = [*self._residuals[1 - _MEMORY:], residual - last[0]]
         self._images = [*self._images[1 - _MEMORY:], image_rows - last[1]]
         steps, images = np.stack(self._residuals, axis=1), np.stack(self._images, axis=1)
-        gram = steps @ steps.transpose(0, 2, 1)
+        gram = np.einsum("cin,cjn->cij", steps, steps)
         diagonal = np.arange(gram.shape[1])
         gram[:, diagonal, diagonal] += 1e-10 * np.trace(gram, axis1=1, axis2=2)[:, None] + 1e-300
-        weights = np.linalg.solve(gram, steps @ residual[:, :, None])
-        result = (image_rows - (weights.transpose(0, 2, 1) @ images)[:, 0]).T
+        weights = np.linalg.solve(gram, np.einsum("cin,cn->ci", steps, residual)[:, :, None])[:, :, 0]
+        result = (image_rows - np.einsum("ci,cin->cn", weights, images)).T
         # A negative radiance can only come from extrapolating too far: such entries keep the plain step.
         return np.where(result >= 0, result, image).astype(np.float32)

@@ -11,19 +11,20 @@ from ...transport.parallel import parallel_for
 from ..base import ProbeGrid
 from .gather import project
 
-# Hits of this many rays are kept: 4 bytes each, 1.5 to 12 for the direction that neighbouring probes share, and 6 more where
-# albedo varies within triangles.
+# Hits of this many rays are kept: 4 bytes each, 1.5 to 12 for the direction that neighbouring probes share, 4 more if they escaped
+# and 6 more where albedo varies within triangles.
 MAX_KEPT_RAYS = 1 << 25
 
 
 @dataclass(frozen=True, eq=False)
 class _Kept:
-    """An item's memory: the shared directions (g·n, 3), the texel (g, n, m) of each ray, and the albedo there (g, n, m, 3)
-    float16 or None where the texel's will do."""
+    """An item's memory: the shared directions (g·n, 3), the texel (g, n, m) of each ray, which rays ``escaped`` (e,) int32, and the
+    albedo at the hits (g, n, m, 3) float16 or None where the texel's will do."""
 
     item: object
     directions: np.ndarray
     texel: np.ndarray
+    escaped: np.ndarray
     albedo: np.ndarray | None
 
 
@@ -51,7 +52,8 @@ class HitMemory:
             albedo = np.zeros((item.ray_count, 3), np.float16)
             albedo[traced.rows] = gathered.albedo
             albedo = albedo.reshape(*item.shape, 3)
-        self.items.append(_Kept(item, traced.directions, whole.reshape(item.shape), albedo))
+        escaped = np.flatnonzero(whole < 0).astype(np.int32)
+        self.items.append(_Kept(item, traced.directions, whole.reshape(item.shape), escaped, albedo))
 
 
 def relight(bake, scene: Scene, progress: Progress) -> tuple[ProbeGrid, ...]:
@@ -80,10 +82,8 @@ def relight(bake, scene: Scene, progress: Progress) -> tuple[ProbeGrid, ...]:
         radiance = np.take(reflected if kept.albedo is not None else by_texel, kept.texel, axis=0, mode="wrap")
         if kept.albedo is not None:
             radiance[..., :3] *= kept.albedo
-        if not context.environment.is_black:
-            escaped = np.flatnonzero(kept.texel.reshape(-1) < 0)
-            sky = context.environment.base_radiance(kept.directions)
-            radiance.reshape(-1, 4)[escaped, :3] = np.take(sky, escaped // kept.item.shape[2], axis=0)
+        if kept.escaped.size and not context.environment.is_black:
+            radiance.reshape(-1, 4)[kept.escaped, :3] = _sky(context, kept)
         projected = project(gatherer.basis(kept.item, kept.directions), radiance)[..., :3] * np.float32(4.0 * np.pi)
         if context.environment.bright.count:
             projected = projected + gatherer.bright_sky(kept.item)
@@ -99,3 +99,14 @@ def relight(bake, scene: Scene, progress: Progress) -> tuple[ProbeGrid, ...]:
     if bake.settings.direct:
         coefficients[probes] += gatherer.lamps(probes)
     return bake.cut(coefficients.astype(np.float32), np.full(len(coefficients), np.nan, np.float32))
+
+
+def _sky(context, kept: _Kept) -> np.ndarray:
+    """Radiance (e, 3) of the world, without its bright patches, along the rays that escaped; looked up once for rays that share
+    a direction."""
+    shared = kept.escaped // kept.item.shape[2]
+    needed = np.zeros(len(kept.directions), bool)
+    needed[shared] = True
+    sky = np.zeros_like(kept.directions)
+    sky[needed] = context.environment.base_radiance(kept.directions[needed])
+    return np.take(sky, shared, axis=0)
