@@ -61,6 +61,7 @@ bpy.ops.wm.open_mainfile(filepath=sys.argv[2])
 volume.rtgi.technique_probes.override_order = True
 volume.rtgi.technique_probes.order = 1
 bpy.ops.wm.save_as_mainfile(filepath=sys.argv[3])
+rtgi_addon.unregister()
 """
     file = tmp_path / "overridden.blend"
     subprocess.run([sys.executable, "-c", program, str(ROOT), str(CORNELL), str(file)], check=True, capture_output=True)

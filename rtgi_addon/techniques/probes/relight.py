@@ -102,11 +102,8 @@ def relight(bake, scene: Scene, progress: Progress) -> tuple[ProbeGrid, ...]:
 
 
 def _sky(context, kept: _Kept) -> np.ndarray:
-    """Radiance (e, 3) of the world, without its bright patches, along the rays that escaped; looked up once for rays that share
-    a direction."""
+    """Radiance (e, 3) of the world, without its bright patches, along the rays that escaped."""
     shared = kept.escaped // kept.item.shape[2]
-    needed = np.zeros(len(kept.directions), bool)
-    needed[shared] = True
-    sky = np.zeros_like(kept.directions)
-    sky[needed] = context.environment.base_radiance(kept.directions[needed])
-    return np.take(sky, shared, axis=0)
+    if len(shared) < len(kept.directions):
+        return context.environment.base_radiance(kept.directions[shared])
+    return np.take(context.environment.base_radiance(kept.directions), shared, axis=0)
