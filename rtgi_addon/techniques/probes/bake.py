@@ -253,7 +253,8 @@ def focus(volumes: tuple[ProbeVolume, ...]) -> tuple[np.ndarray, float]:
 
 
 def texel_size(context: LightContext, volumes: tuple[ProbeVolume, ...], texels: float) -> float:
-    """Side [m] of the cache's texels: no more than half a cell, and small enough for some ``texels`` on what lies near."""
+    """Side [m] of the cache's texels: small enough for some ``texels`` on what lies near, or for twice as many where probes stand
+    so dense, and so close to walls, that a texel should be no more than a quarter of a cell."""
     center, radius = focus(volumes)
     corners = context.geometry.triangles_world
     gap = np.maximum(np.maximum(corners.min(axis=1) - center, center - corners.max(axis=1)), 0)
@@ -262,4 +263,5 @@ def texel_size(context: LightContext, volumes: tuple[ProbeVolume, ...], texels: 
     share = np.minimum(1.0, (radius / np.maximum(distance, radius)) ** 2)
     area = np.minimum(context.geometry.areas * share, 4.0 * np.pi * radius**2).sum(dtype=np.float64)
     spacing = min(cell_size(volume.world_from_local, volume.resolution).min() for volume in volumes)
-    return float(min(0.5 * spacing, np.sqrt(max(area, 1e-12) / texels)))
+    size = np.sqrt(max(area, 1e-12) / texels)
+    return float(np.clip(0.25 * spacing, size / np.sqrt(2.0), size))
