@@ -220,9 +220,11 @@ class _Axis:
     def cell(self, primitive, t, any_warp):
         cells = self.cells[primitive]
         if any_warp:
-            warped = self.warped[primitive]
-            t = np.where(warped, (np.arcsinh(self._start[primitive] + self._scale[primitive] * t) - self._low[primitive])
-                         / self._span[primitive], t)
+            rows = np.flatnonzero(self.warped[primitive])
+            chosen = primitive[rows]
+            position = np.arcsinh(self._start[chosen] + self._scale[chosen] * t[rows])
+            t = t.copy()
+            t[rows] = (position - self._low[chosen]) / self._span[chosen]
         return np.clip((t * cells).astype(np.int32), 0, cells - 1)
 
     def edges(self, triangle, index):
