@@ -29,3 +29,5 @@ lint: setup          ## check style
 bench: setup         ## measure again what benchmarks/README.md says
 	$(PYTHON) benchmarks/ray_rate.py
 	$(PYTHON) benchmarks/bake_vs_cycles.py
+	$(PYTHON) benchmarks/relight.py
+	$(PYTHON) benchmarks/scale.py
