@@ -64,21 +64,22 @@ def sobol_owen(n: int, dims: int, seed, start: int = 0, shuffle: bool = False) -
     return sobol_owen_at(index, dims, np.uint32(int(seed) & 0xFFFFFFFF), shuffle)
 
 
-def sobol_owen_at(index: np.ndarray, dims: int, seed, shuffle: bool = False) -> np.ndarray:
-    """As ``sobol_owen`` for any integer ``index`` and ``seed`` arrays, which broadcast: (…, dims) float32 in [0, 1)."""
+def sobol_owen_at(index: np.ndarray, dims: int, seed, shuffle: bool = False, first: int = 0) -> np.ndarray:
+    """As ``sobol_owen`` for any integer ``index`` and ``seed`` arrays, which broadcast: dimensions ``first`` … ``dims`` − 1 as
+    (…, dims − first) float32 in [0, 1)."""
     if not 1 <= dims <= SOBOL_DIMENSIONS:
         raise ValueError(f"{dims} dimensions asked for; 1 to {SOBOL_DIMENSIONS} are there")
     index, seed = np.asarray(index).astype(np.uint32), np.asarray(seed).astype(np.uint32)
     if shuffle:
         index = _reverse_bits(_owen_of_reversed(_reverse_bits(index), hash_u32(seed, dims)))
     octets = [(index >> np.uint32(shift)) & np.uint32(255) for shift in (0, 8, 16, 24)]
-    points = np.empty((*np.broadcast_shapes(index.shape, seed.shape), dims), np.float32)
+    points = np.empty((*np.broadcast_shapes(index.shape, seed.shape), dims - first), np.float32)
     tables = _sobol_tables()
-    for d in range(dims):
+    for d in range(first, dims):
         reversed_bits = tables[d, 0][octets[0]]
         for table, octet in zip(tables[d, 1:], octets[1:], strict=True):
             reversed_bits = reversed_bits ^ table[octet]
-        points[..., d] = _unit_interval(_reverse_bits(_owen_of_reversed(reversed_bits, hash_u32(seed, d + 1))))
+        points[..., d - first] = _unit_interval(_reverse_bits(_owen_of_reversed(reversed_bits, hash_u32(seed, d + 1))))
     return points
 
 

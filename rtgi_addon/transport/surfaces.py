@@ -4,11 +4,10 @@ import numpy as np
 
 from ..scene import Channel, Material, Mesh, Scene, Texture
 from .geometry import Geometry
+from .textures import TextureSampler
 
 # A closed room of albedo 1 has no finite radiance; this cap keeps the series of bounces convergent (500 bounces to 1/e).
 MAX_ALBEDO = 0.998
-
-_BYTE_TO_UNIT = (np.arange(256) / 255.0).astype(np.float32)
 
 
 class Surfaces:
@@ -20,6 +19,7 @@ class Surfaces:
         self._materials = scene.materials or (Material("default"),)
         self._uv_cache: dict[str | None, np.ndarray] = {}
         self._attribute_cache: dict[str, np.ndarray] = {}
+        self._samplers: dict[int, TextureSampler] = {}
         self._albedo = _Table(self, [material.albedo for material in self._materials], 0.0, MAX_ALBEDO)
         self._emission = _Table(self, [material.emission for material in self._materials], 0.0, np.inf)
         self._alpha = _Table(self, [material.alpha for material in self._materials], 0.0, 1.0)
@@ -95,6 +95,12 @@ class Surfaces:
             self._attribute_cache[name] = np.concatenate(parts)
         return self._attribute_cache[name]
 
+    def _sampler(self, texture: Texture) -> TextureSampler:
+        # By identity: the scene holds its textures for as long as this lives.
+        if id(texture) not in self._samplers:
+            self._samplers[id(texture)] = TextureSampler(texture)
+        return self._samplers[id(texture)]
+
     def channel(self, channel: Channel, primitive: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
         """One channel's value (n, 3) at hits, unclamped."""
         value = np.broadcast_to(channel.constant.astype(np.float32), (len(primitive), 3))
@@ -104,7 +110,7 @@ class Surfaces:
             if channel.uv_transform is not None:
                 matrix = np.asarray(channel.uv_transform, np.float32)
                 uv = uv @ matrix[:, :2].T + matrix[:, 2]
-            value = value * sample_texture(channel.texture, uv, channel.texture_channel)
+            value = value * self._sampler(channel.texture).sample(uv, channel.texture_channel)
         if channel.attribute is not None:
             value = value * _interpolate(self.corner_attribute(channel.attribute)[mesh_triangle], u, v)
         if channel.offset is not None:
@@ -131,66 +137,6 @@ class _Table:
                 value = self._surfaces.channel(self._channels[index], primitive[rows], u[rows], v[rows])
                 result[rows] = np.clip(value, self._low, self._high)
         return result
-
-
-def sample_texture(texture: Texture, uv: np.ndarray, component: str = "rgb") -> np.ndarray:
-    """Texture value (n, 3), scene-linear, at ``uv`` (n, 2): bilinear between texel centres (or the nearest texel for
-    'Closest'), v = 0 at row 0, outside handled by the texture's extension as Cycles does (CLIP is black and transparent).
-
-    sRGB is decoded after filtering, as in Cycles (`svm_image_texture`), which also costs one decoding instead of four."""
-    value = _filtered(texture, uv, component)
-    return _linear_from_srgb(value) if texture.srgb and component != "a" else value
-
-
-def _filtered(texture: Texture, uv: np.ndarray, component: str) -> np.ndarray:
-    height, width = texture.pixels.shape[:2]
-    x, y = uv[:, 0] * width, uv[:, 1] * height
-    if texture.interpolation == "Closest":
-        return _texel(texture, np.floor(x).astype(np.int64), np.floor(y).astype(np.int64), component)
-    x, y = x - 0.5, y - 0.5
-    column, row = np.floor(x), np.floor(y)
-    fx, fy = (x - column).astype(np.float32)[:, None], (y - row).astype(np.float32)[:, None]
-    column, row = column.astype(np.int64), row.astype(np.int64)
-    lower = _texel(texture, column, row, component) * (1 - fx) + _texel(texture, column + 1, row, component) * fx
-    upper = _texel(texture, column, row + 1, component) * (1 - fx) + _texel(texture, column + 1, row + 1, component) * fx
-    return lower * (1 - fy) + upper * fy
-
-
-def _texel(texture: Texture, column: np.ndarray, row: np.ndarray, component: str) -> np.ndarray:
-    height, width, channels = texture.pixels.shape
-    outside = None
-    if texture.extension == "REPEAT":
-        column, row = column % width, row % height
-    elif texture.extension == "MIRROR":
-        column, row = _mirror(column, width), _mirror(row, height)
-    else:
-        if texture.extension == "CLIP":
-            outside = (column < 0) | (column >= width) | (row < 0) | (row >= height)
-        column, row = np.clip(column, 0, width - 1), np.clip(row, 0, height - 1)
-    if component == "rgb":
-        pick = [0, 1, 2] if channels >= 3 else [0, 0, 0]
-    else:
-        pick = ["rgba".index(component)] if "rgba".index(component) < channels else None
-    if pick is None:
-        return np.ones((len(row), 3), np.float32)
-    value = texture.pixels[row, column][:, pick]
-    if value.dtype == np.uint8:
-        value = _BYTE_TO_UNIT[value]
-    if value.shape[1] == 1:
-        value = np.repeat(value, 3, axis=1)
-    if outside is not None:
-        value[outside] = 0.0
-    return value.astype(np.float32, copy=False)
-
-
-def _linear_from_srgb(encoded: np.ndarray) -> np.ndarray:
-    curve = ((np.maximum(encoded, np.float32(0)) + np.float32(0.055)) / np.float32(1.055)) ** np.float32(2.4)
-    return np.where(encoded <= np.float32(0.04045), encoded / np.float32(12.92), curve)
-
-
-def _mirror(index: np.ndarray, size: int) -> np.ndarray:
-    period = index % (2 * size)
-    return np.where(period < size, period, 2 * size - 1 - period)
 
 
 def _interpolate(corners: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:

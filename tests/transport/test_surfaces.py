@@ -8,9 +8,14 @@ import scene_builders as build
 
 from rtgi_addon.scene import Channel, Instance, Material, Texture
 from rtgi_addon.transport.geometry import flatten
-from rtgi_addon.transport.surfaces import MAX_ALBEDO, Surfaces, sample_texture
+from rtgi_addon.transport.surfaces import MAX_ALBEDO, Surfaces
+from rtgi_addon.transport.textures import TextureSampler
 
 SQUARE_UV = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], np.float32)
+
+
+def sample_texture(texture, uv, component="rgb"):
+    return TextureSampler(texture).sample(uv, component)
 
 
 def textured_plane(channel, **mesh_options):

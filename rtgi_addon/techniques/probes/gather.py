@@ -135,7 +135,7 @@ class Gatherer:
     def _numbers(self, item: Item, last: int, first: int = 0) -> np.ndarray:
         """Dimensions ``first`` … ``last`` − 1 of the groups' sequences: (g, n, last − first)."""
         index = item.first[:, None] + np.arange(item.count)
-        return sobol_owen_at(index, last, hash_u32(self._seed, item.groups)[:, None])[..., first:]
+        return sobol_owen_at(index, last, hash_u32(self._seed, item.groups)[:, None], first=first)
 
     def _light_numbers(self, item: Item, dimensions: int, purpose: int) -> np.ndarray:
         """(g, n / RAYS_PER_LIGHT_SAMPLE, dimensions) for samples of one kind of light, in step with the rays."""
