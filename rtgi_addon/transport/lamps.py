@@ -200,6 +200,11 @@ def _sample_sphere(rows, radius, direction, distance, factor, uv):
     factor[rows] = 2.0 * spread / (r * r)
 
 
+def spot_attenuation(light: SpotLight, directions: np.ndarray) -> np.ndarray:
+    """Intensity (n,) relative to the full one that a spot without radius sends into unit world ``directions`` (n, 3)."""
+    return _spot_attenuation(_point_rows([light]), -np.asarray(directions, np.float32))
+
+
 def _sample_spot(lamps: _Lamps, points: np.ndarray, uv: np.ndarray):
     direction, distance, irradiance = _sample_point(lamps, points, uv)
     attenuation = _spot_attenuation(lamps, direction)

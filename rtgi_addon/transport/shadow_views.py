@@ -1,0 +1,284 @@
+"""The views from which lamps are captured into reflective shadow maps, and the power that leaves a lamp through each texel.
+
+A view is a pinhole (spot, point, area) or a parallel projection (sun, an area lamp of spread 0). Through a texel of solid angle Ω a
+pinhole sends I(ω)·Ω, through one of area A a parallel beam sends E·A: neither knows the receiver's cosine, because a tilted surface
+takes the same power on more area. Point and spot lamps that have a radius are seen from their centre.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..scene import AreaLight, Light, PointLight, SpotLight, SunLight
+from .lamps import spot_attenuation
+
+# Faces of a cube, in the order of graphics APIs, and for each an up vector that is not parallel to it.
+CUBE_AXES = np.array([(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)], np.float64)
+_CUBE_UPS = np.array([(0, 0, 1)] * 4 + [(0, 1, 0)] * 2, np.float64)
+# A cone wider than this half tangent is cut into the faces of a cube: a single frustum would spend its texels on the rim.
+MAX_TANGENT = 2.0
+# Rays and rasters begin at this share of the far distance: nothing on the lamp's own plane shadows it.
+NEAR_SHARE = 1e-4
+_GOLDEN_FRACTION = (np.sqrt(5.0) - 1.0) / 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class ShadowView:
+    """One square image of the scene as a lamp lights it.
+
+    ``lamp`` indexes ``Scene.lights``; ``face`` counts a lamp's views; ``world_from_view`` (4, 4) float64 looks along −Z with +Y up;
+    ``clip_from_view`` (4, 4) float64 is OpenGL's (depth −1 … 1); ``near`` and ``far`` [m] along −Z; ``share`` of the lamp's surface
+    that this view stands for. Row 0 of the ``resolution`` × ``resolution`` texels is the bottom one.
+    """
+
+    lamp: int
+    face: int
+    world_from_view: np.ndarray
+    clip_from_view: np.ndarray
+    orthographic: bool
+    resolution: int
+    near: float
+    far: float
+    share: float = 1.0
+
+    @property
+    def position_world(self) -> np.ndarray:
+        """(3,) float64: the pinhole, or the middle of the plane that a parallel projection starts from."""
+        return self.world_from_view[:3, 3]
+
+    @property
+    def clip_from_world(self) -> np.ndarray:
+        """(4, 4) float64."""
+        return self.clip_from_view @ np.linalg.inv(self.world_from_view)
+
+    def rays(self) -> tuple[np.ndarray, np.ndarray]:
+        """Through every texel's centre, row by row: origins (n, 3) float32 on the near plane and directions (n, 3) float32 that
+        reach the far plane at t = 1."""
+        ndc = _texel_centres(self.resolution)
+        grid = np.stack(np.meshgrid(ndc, ndc), axis=-1).reshape(-1, 2)
+        world_from_clip = self.world_from_view @ np.linalg.inv(self.clip_from_view)
+        first, last = (_unproject(world_from_clip, grid, depth) for depth in (-1.0, 1.0))
+        return first.astype(np.float32), (last - first).astype(np.float32)
+
+    def directions(self) -> np.ndarray:
+        """Unit directions (n, 3) float64 in which light travels through the texels' centres."""
+        x, y = self._window(_texel_centres(self.resolution))
+        view = np.stack([*(part.ravel() for part in np.meshgrid(x, y)), np.full(x.size * y.size, -1.0)], axis=-1)
+        if self.orthographic:
+            view[:, :2] = 0.0
+        return (view / np.linalg.norm(view, axis=1, keepdims=True)) @ self.world_from_view[:3, :3].T
+
+    def texel_measure(self) -> np.ndarray:
+        """(resolution, resolution) float64: exact solid angle [sr] of each texel, or area [m²] of one of a parallel projection."""
+        edges = np.linspace(-1.0, 1.0, self.resolution + 1)
+        x, y = self._window(edges)
+        if self.orthographic:
+            return np.diff(y)[:, None] * np.diff(x)[None, :]
+        corner = np.arctan2(x[None, :] * y[:, None], np.sqrt(x[None, :] ** 2 + y[:, None] ** 2 + 1.0))
+        return np.diff(np.diff(corner, axis=0), axis=1)
+
+    def project(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Map coordinates (n, 2) of world ``points`` (n, 3), [0, 1] inside the map, and which of them lie in front (n,) bool."""
+        clip = np.asarray(points, np.float64) @ self.clip_from_world[:, :3].T + self.clip_from_world[:, 3]
+        front = clip[:, 3] > 0
+        return 0.5 + 0.5 * clip[:, :2] / np.where(front, clip[:, 3], 1.0)[:, None], front
+
+    def _window(self, ndc: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """View-space x and y of normalized device coordinates: at depth 1 of a pinhole, anywhere in a parallel projection."""
+        matrix, column = self.clip_from_view, 3 if self.orthographic else 2
+        sign = 1.0 if not self.orthographic else -1.0
+        return tuple((ndc + sign * matrix[axis, column]) / matrix[axis, axis] for axis in range(2))
+
+
+def views_of(context, lamp: int, resolution: int = 512, *, focus: np.ndarray | None = None,
+             area_points: int = 4) -> tuple[ShadowView, ...]:
+    """The views of lamp ``lamp`` of ``context``; none where it gives no light.
+
+    A sun is fitted to the box ``focus`` (2, 3) (None: the whole scene) and moves in whole texels; a point lamp gets the faces of a
+    cube; a spot a frustum around its cone, or cube faces if that is wide; an area lamp ``area_points`` stratified points with a
+    hemicube each, or a frustum if its beam is narrow.
+    """
+    light = context.scene.lights[lamp]
+    bounds = np.array(context.geometry.bounds(), np.float64)
+    if not np.any(_strength(light) > 0):
+        return ()
+    if isinstance(light, SunLight):
+        placed = [_sun_view(light, bounds, bounds if focus is None else np.asarray(focus, np.float64), resolution)]
+    elif isinstance(light, PointLight):
+        placed = _cube_views(light.position_world, bounds)
+    elif isinstance(light, SpotLight):
+        placed = _spot_views(light, bounds)
+    else:
+        placed = _area_views(light, bounds, area_points)
+    views = tuple(ShadowView(lamp, face, *view[:3], resolution, *view[3:]) for face, view in enumerate(placed))
+    # A wide spot reaches some faces of its cube only.
+    return tuple(view for view in views if texel_power(light, view).any()) if isinstance(light, SpotLight) else views
+
+
+def texel_power(light: Light, view: ShadowView) -> np.ndarray:
+    """Power (resolution, resolution, 3) float32 [W] that ``light`` sends through each texel of ``view``."""
+    measure = view.texel_measure().ravel()
+    if isinstance(light, SunLight):
+        per_measure = np.ones(measure.size)
+    elif isinstance(light, PointLight):
+        per_measure = np.ones(measure.size)
+    elif isinstance(light, SpotLight):
+        per_measure = spot_attenuation(light, view.directions())
+    elif view.orthographic:
+        per_measure = np.pi * _inside(light, view)
+    else:
+        cosine = view.directions() @ np.asarray(light.normal_world, np.float64)
+        per_measure = view.share * light.area * np.maximum(cosine, 0.0) * _spread_gain(light, cosine)
+    power = (per_measure * measure)[:, None] * _strength(light)
+    return power.reshape(view.resolution, view.resolution, 3).astype(np.float32)
+
+
+def _strength(light: Light) -> np.ndarray:
+    name = {SunLight: "irradiance", AreaLight: "radiance"}.get(type(light), "intensity")
+    return np.broadcast_to(np.asarray(getattr(light, name), np.float64), (3,))
+
+
+def _sun_view(light: SunLight, bounds: np.ndarray, focus: np.ndarray, resolution: int):
+    """Fitted to the focus's bounding sphere, whose size does not change as the sun turns; the texel lattice goes through the
+    world's origin, so texels stay where they are when the focus moves."""
+    rotation = _look_along(light.direction_world)
+    radius = max(0.5 * float(np.linalg.norm(focus[1] - focus[0])), 1e-6)
+    half = radius * resolution / max(resolution - 2, 1)
+    texel = 2.0 * half / resolution
+    centre = focus.mean(axis=0) @ rotation
+    centre[:2] = np.round(centre[:2] / texel) * texel
+    depth = _corners(bounds) @ rotation[:, 2]
+    margin = 1e-3 * max(float(np.ptp(depth)), radius)
+    # The eye lies before everything that can cast a shadow into the focus.
+    centre[2] = float(depth.max()) + 2.0 * margin
+    far = centre[2] - float(depth.min()) + margin
+    return _pose(rotation, rotation @ centre), _orthographic(half, half, margin, far), True, margin, far
+
+
+def _cube_views(position, bounds: np.ndarray, axes=range(6)):
+    near, far = _depths(position, bounds)
+    for axis in axes:
+        yield _pose(_look_along(CUBE_AXES[axis], _CUBE_UPS[axis]), position), _frustum(-1, 1, -1, 1, near, far), False, near, far
+
+
+def _spot_views(light: SpotLight, bounds: np.ndarray):
+    rotation = _look_along(light.direction_world)
+    local = np.eye(3) if light.world_from_local is None else np.asarray(light.world_from_local, np.float64)
+    axes = rotation if light.world_from_local is None else local
+    half = 0.5 * min(light.cone_angle, np.pi)
+    if half < 0.5 * np.pi - 1e-3:
+        angle = np.linspace(0.0, 2.0 * np.pi, 256, endpoint=False)
+        rim = np.stack([np.tan(half) * np.cos(angle), np.tan(half) * np.sin(angle), np.full(angle.size, -1.0)])
+        x, y, z = rotation.T @ (axes @ rim)
+        if np.all(z < 0):
+            # The rim is sampled: a thousandth more than its extremes covers the arcs between.
+            tangent = 1.001 * float(np.max(np.abs(np.stack([x, y]) / z)))
+            if tangent <= MAX_TANGENT:
+                near, far = _depths(light.position_world, bounds)
+                pose = _pose(rotation, light.position_world)
+                return [(pose, _frustum(-tangent, tangent, -tangent, tangent, near, far), False, near, far)]
+    return list(_cube_views(light.position_world, bounds))
+
+
+def _area_views(light: AreaLight, bounds: np.ndarray, points: int):
+    """A hemicube at each of ``points`` stratified points: a Fibonacci lattice of the shape, its middle if there is but one."""
+    normal = np.asarray(light.normal_world, np.float64)
+    half_u, half_v, centre = (np.asarray(axis, np.float64) for axis in
+                              (light.half_u_world, light.half_v_world, light.position_world))
+    tangent = np.tan(0.5 * light.spread) if light.spread < np.pi - 1e-6 else np.inf
+    front = _look_along(normal, half_v)
+    if tangent == 0:
+        corners = np.stack([half_u, half_v]) @ front
+        width, height = np.abs(corners[:, :2]).sum(axis=0)
+        near, far = _depths(centre, bounds)
+        return [(_pose(front, centre), _orthographic(width, height, near, far), True, near, far)]
+    views = []
+    for s, t in _shape_points(light.shape, points):
+        position = centre + s * half_u + t * half_v
+        near, far = _depths(position, bounds)
+        reach = min(tangent, 1.0)
+        views.append((_pose(front, position), _frustum(-reach, reach, -reach, reach, near, far), False, near, far, 1.0 / points))
+        if tangent > 1:
+            for side in (front[:, 0], -front[:, 0], front[:, 1], -front[:, 1]):
+                pose = _pose(_look_along(side, normal), position)
+                views.append((pose, _frustum(-1, 1, 0, 1, near, far), False, near, far, 1.0 / points))
+    return views
+
+
+def _shape_points(shape: str, count: int) -> np.ndarray:
+    index = np.arange(count)
+    u, v = (index + 0.5) / count, np.mod(0.5 + index * _GOLDEN_FRACTION, 1.0)
+    if shape == "ELLIPSE":
+        radius = np.sqrt(u) if count > 1 else np.zeros(1)
+        return np.stack([radius * np.cos(2 * np.pi * v), radius * np.sin(2 * np.pi * v)], axis=-1)
+    return np.stack([2 * u - 1, 2 * v - 1], axis=-1)
+
+
+def _spread_gain(light: AreaLight, cosine: np.ndarray) -> np.ndarray:
+    """Radiance in a direction relative to ``light.radiance``: the slats of a soft box (see ``AreaLight``)."""
+    half = 0.5 * light.spread
+    if half >= 0.5 * np.pi - 1e-6:
+        return np.ones_like(cosine)
+    tangent = np.sqrt(np.maximum(1.0 - cosine**2, 0.0)) / np.maximum(cosine, 1e-30)
+    # tan x − x by its series where it cancels.
+    scale = np.tan(half) - half if half > 0.05 else half**3 / 3.0
+    return np.maximum(np.tan(half) - tangent, 0.0) / scale
+
+
+def _inside(light: AreaLight, view: ShadowView) -> np.ndarray:
+    """(n,) bool: texels of a parallel beam's view whose centres lie within the lamp's shape."""
+    x, y = view._window(_texel_centres(view.resolution))
+    plane = np.stack([part.ravel() for part in np.meshgrid(x, y)], axis=-1)
+    axes = np.stack([light.half_u_world, light.half_v_world]).astype(np.float64) @ view.world_from_view[:3, :2]
+    s, t = np.linalg.solve(axes.T, plane.T)
+    return s * s + t * t <= 1.0 if light.shape == "ELLIPSE" else (np.abs(s) <= 1.0) & (np.abs(t) <= 1.0)
+
+
+def _look_along(direction, up=None) -> np.ndarray:
+    """Rotation (3, 3) whose columns are right, up and −``direction``. Without ``up`` world Z is up, or Y along the poles."""
+    back = -np.asarray(direction, np.float64)
+    back /= np.linalg.norm(back)
+    if up is None:
+        up = (0.0, 0.0, 1.0) if abs(back[2]) < 0.99 else (0.0, 1.0, 0.0)
+    right = np.cross(up, back)
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(back, right), back], axis=1)
+
+
+def _pose(rotation: np.ndarray, position) -> np.ndarray:
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = rotation, position
+    return pose
+
+
+def _depths(position, bounds: np.ndarray) -> tuple[float, float]:
+    """Near and far distance [m] of a pinhole that sees all of ``bounds``, wherever it looks."""
+    farthest = np.linalg.norm(_corners(bounds) - np.asarray(position, np.float64), axis=1).max()
+    far = 1.001 * max(float(farthest), 1e-6)
+    return NEAR_SHARE * far, far
+
+
+def _corners(bounds: np.ndarray) -> np.ndarray:
+    return np.stack(np.meshgrid(*bounds.T, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+def _frustum(left, right, bottom, top, near, far) -> np.ndarray:
+    """OpenGL's perspective matrix with the window given at depth 1."""
+    return np.array([[2 / (right - left), 0, (right + left) / (right - left), 0],
+                     [0, 2 / (top - bottom), (top + bottom) / (top - bottom), 0],
+                     [0, 0, -(far + near) / (far - near), -2 * far * near / (far - near)], [0, 0, -1, 0]], np.float64)
+
+
+def _orthographic(half_width, half_height, near, far) -> np.ndarray:
+    return np.array([[1 / half_width, 0, 0, 0], [0, 1 / half_height, 0, 0],
+                     [0, 0, -2 / (far - near), -(far + near) / (far - near)], [0, 0, 0, 1]], np.float64)
+
+
+def _texel_centres(resolution: int) -> np.ndarray:
+    return (np.arange(resolution) + 0.5) / resolution * 2.0 - 1.0
+
+
+def _unproject(world_from_clip: np.ndarray, grid: np.ndarray, depth: float) -> np.ndarray:
+    clip = np.concatenate([grid, np.full((len(grid), 1), depth), np.ones((len(grid), 1))], axis=1)
+    world = clip @ world_from_clip.T
+    return world[:, :3] / world[:, 3:]
