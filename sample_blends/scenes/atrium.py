@@ -55,14 +55,17 @@ def gradient_sky() -> None:
 
 
 def masonry(stone, plaster, tiles) -> None:
-    """Floors, roof and outer walls: boxes that reach into one another."""
+    """Floors, roof and outer walls: boxes that reach into or touch one another, yet no two show a face in one and the same place.
+
+    What lies twice in a plane has no right picture: in Cycles each of the two shadows the other as rounding has it.
+    """
     x, y = COURT
     outer_x, outer_y = x + GALLERY, y + GALLERY
     top = 2 * STOREY
-    kit.cube_uvs(kit.box("Ground", (-outer_x - 0.3, -outer_y - 0.3, -0.4), (outer_x + 0.3, outer_y + 0.3, 0.0), tiles), 1.6)
+    kit.cube_uvs(kit.box("Ground", (-outer_x - 0.4, -outer_y - 0.4, -0.4), (outer_x + 0.4, outer_y + 0.4, 0.0), tiles), 1.6)
     for name, low, high in (
-            ("Wall West", (-outer_x - 0.3, -outer_y - 0.3), (-outer_x, outer_y + 0.3)),
-            ("Wall East", (outer_x, -outer_y - 0.3), (outer_x + 0.3, outer_y + 0.3)),
+            ("Wall West", (-outer_x - 0.3, -outer_y - 0.15), (-outer_x, outer_y + 0.15)),
+            ("Wall East", (outer_x, -outer_y - 0.15), (outer_x + 0.3, outer_y + 0.15)),
             ("Wall South", (-outer_x - 0.1, -outer_y - 0.3), (outer_x + 0.1, -outer_y)),
             ("Wall North", (-outer_x - 0.1, outer_y), (outer_x + 0.1, outer_y + 0.3))):
         kit.cube_uvs(kit.box(name, (*low, -0.2), (*high, top - 0.1), plaster), STOREY)
@@ -70,11 +73,11 @@ def masonry(stone, plaster, tiles) -> None:
         for name, low, high in (
                 ("West", (-outer_x - 0.2, -outer_y - 0.2), (-x + 0.2, outer_y + 0.2)),
                 ("East", (x - 0.2, -outer_y - 0.2), (outer_x + 0.2, outer_y + 0.2)),
-                ("South", (-x, -outer_y - 0.2), (x, -y + 0.2)), ("North", (-x, y - 0.2), (x, outer_y + 0.2))):
+                ("South", (0.2 - x, -outer_y - 0.2), (x - 0.2, 0.2 - y)), ("North", (0.2 - x, y - 0.2), (x - 0.2, outer_y + 0.2))):
             kit.cube_uvs(kit.box(f"Slab {level} {name}", (*low, low_z), (*high, high_z), coat), 1.6)
     for i, (sign_x, sign_y) in enumerate(((-1, -1), (1, -1), (-1, 1), (1, 1)), 1):
-        low = (sign_x * x - 0.25, sign_y * y - 0.25, -0.1)
-        kit.cube_uvs(kit.box(f"Corner Pier {i}", low, (sign_x * x + 0.25, sign_y * y + 0.25, top - 0.1), stone))
+        low = (sign_x * x - 0.26, sign_y * y - 0.26, -0.1)
+        kit.cube_uvs(kit.box(f"Corner Pier {i}", low, (sign_x * x + 0.26, sign_y * y + 0.26, top - 0.1), stone))
 
 
 def lathe(name: str, profile, segments: int, coat) -> bpy.types.Object:

@@ -17,9 +17,9 @@ from rtgi_addon.progress import Progress  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[2]
 REFERENCES = {path.stem: path for path in sorted((ROOT / "tests/references").glob("*.npz"))}
-# What default settings reach where they miss 1 %. The atrium's light comes from small sun patches through arcades: its dim upper
-# corners are 5 % off Cycles, for the path reference as for the bake, and the bake's own noise is underestimated there.
-KNOWN_SHORTFALL = {"atrium": (0.016, 0.006)}
+# What default settings reach where they miss 1 %. The atrium's light comes from small sun patches through arcades: the noise of
+# those patches is underestimated, so that the bake stops too early.
+KNOWN_SHORTFALL = {"atrium": (0.014, 0.003)}
 SAMPLES = sorted(path.stem for path in (ROOT / "sample_blends").glob("*.blend"))
 
 
