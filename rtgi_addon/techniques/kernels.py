@@ -1,0 +1,69 @@
+"""The inner loops of VPLs, RSMs and LPVs as functions from arrays to arrays, so that numpy and the GPU can take each other's place.
+
+``Technique.bake(..., kernels=...)`` takes any object that keeps this protocol; ``NUMPY`` is the one for the CPU, and what a GPU's
+must agree with. Signatures and conventions are those of the numpy functions that ``NumpyKernels`` names.
+"""
+
+from typing import Protocol
+
+import numpy as np
+
+
+class Kernels(Protocol):
+    """What the techniques vpl, rsm and lpv ask of a device."""
+
+    def capture(self, context, view):
+        """``transport.reflective_shadow_map.capture``: what the lamp of a ShadowView sees, as a ReflectiveShadowMap."""
+
+    def rsm_gather(self, *arguments, **settings) -> np.ndarray:
+        """``techniques.rsm.gather.gather``: the paper's unoccluded gather, irradiance (n, 3)."""
+
+    def lpv_inject(self, *arguments, **settings) -> np.ndarray:
+        """``techniques.lpv.injection.inject``: virtual lights into an SH volume (3, nz, ny, nx, 4)."""
+
+    def lpv_propagate(self, *arguments, **settings) -> np.ndarray:
+        """``techniques.lpv.propagation.propagate``: the accumulated volume after some steps."""
+
+    def lpv_gather(self, *arguments, **settings) -> np.ndarray:
+        """``techniques.lpv.gather.gather``: irradiance (n, 3) from accumulated volumes."""
+
+    def vpl_gather(self, lights, points: np.ndarray, normals: np.ndarray, visibility: np.ndarray | None,
+                   clamp: float | None) -> np.ndarray:
+        """``techniques.vpl.gather.gather_visible``: irradiance (n, 3) from surface VPLs with known visibility (n, m)."""
+
+
+class NumpyKernels:
+    """The kernels on the CPU. Each technique is imported when it is first asked for: techniques import this module."""
+
+    def capture(self, context, view):
+        """See Kernels."""
+        from ..transport.reflective_shadow_map import capture
+        return capture(context, view)
+
+    def rsm_gather(self, *arguments, **settings) -> np.ndarray:
+        """See Kernels."""
+        from .rsm.gather import gather
+        return gather(*arguments, **settings)
+
+    def lpv_inject(self, *arguments, **settings) -> np.ndarray:
+        """See Kernels."""
+        from .lpv.injection import inject
+        return inject(*arguments, **settings)
+
+    def lpv_propagate(self, *arguments, **settings) -> np.ndarray:
+        """See Kernels."""
+        from .lpv.propagation import propagate
+        return propagate(*arguments, **settings)
+
+    def lpv_gather(self, *arguments, **settings) -> np.ndarray:
+        """See Kernels."""
+        from .lpv.gather import gather
+        return gather(*arguments, **settings)
+
+    def vpl_gather(self, lights, points, normals, visibility, clamp) -> np.ndarray:
+        """See Kernels."""
+        from .vpl.gather import gather_visible
+        return gather_visible(lights, points, normals, visibility, clamp)
+
+
+NUMPY = NumpyKernels()
