@@ -61,7 +61,7 @@ def bake_scene(scene: Scene, technique: str = "probes", overrides: dict | None =
                             checkpoint=checkpoint)
         progress.stage("write")
         progress.step(written - 0.02, f"Writing {target.name}")
-        write_bundle(target, field, scene, settings=asdict(settings), seed=seed, notes=[*scene.notes, *warnings],
+        write_bundle(target, field, scene, settings=asdict(settings), seed=seed, notes=[*scene.notes, *field.notes, *warnings],
                      stats=lambda: _stats(field, progress))
     except BaseException:
         checkpoint.remove_if_empty()

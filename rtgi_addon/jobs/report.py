@@ -72,7 +72,7 @@ def summarize(field: Field, scene: Scene, *, out: Path, technique: str, settings
         out=out, technique=technique, settings=settings, seed=seed,
         volumes=tuple(volume_summary(grid) for grid in field.grids()),
         includes_direct=bool(field.includes_direct), rays=int(stats["rays"]), seconds=stats["seconds"],
-        peak_memory_bytes=stats["peak_memory_bytes"], resumed=resumed, warnings=tuple(warnings), notes=tuple(scene.notes),
+        peak_memory_bytes=stats["peak_memory_bytes"], resumed=resumed, warnings=tuple(warnings), notes=(*scene.notes, *field.notes),
         stats={name: value for name, value in stats.items() if name not in ("rays", "seconds", "peak_memory_bytes")})
 
 

@@ -1,7 +1,7 @@
 """The two interfaces every technique keeps: ``Technique.bake`` makes a ``Field``; a ``Field`` answers for irradiance."""
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import ClassVar
 
 import numpy as np
@@ -31,6 +31,20 @@ def validate_settings(settings) -> None:
         low, high = meta.get("minimum"), meta.get("maximum")
         if not np.isfinite(value) or (low is not None and value < low) or (high is not None and value > high):
             raise UsageError(f"{item.name} is {value:g}", f"give a value from {low} to {high}")
+
+
+def volumes_by_settings(volumes: tuple[ProbeVolume, ...], settings) -> list[tuple[object, tuple[ProbeVolume, ...]]]:
+    """Volumes grouped by their settings, where a volume's own overrides replace those of the bake's ``settings``.
+
+    Raises UsageError for an override out of range; those that the technique does not have are left aside.
+    """
+    groups: dict[object, list[ProbeVolume]] = {}
+    known = {item.name for item in fields(settings)}
+    for volume in volumes:
+        own = replace(settings, **{name: value for name, value in volume.settings.items() if name in known})
+        validate_settings(own)
+        groups.setdefault(own, []).append(volume)
+    return [(own, tuple(members)) for own, members in groups.items()]
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,11 +83,13 @@ BACKFACE_THRESHOLD = 0.25
 class Field(ABC):
     """Indirect irradiance everywhere, as one technique knows it: view-independent and immutable.
 
-    ``includes_direct`` says whether the light of lamps is in it; ``params`` and ``stats`` are JSON-able dictionaries.
+    ``includes_direct`` says whether the light of lamps is in it; ``params`` and ``stats`` are JSON-able dictionaries; ``notes`` are
+    lines for the user about what this field of this scene leaves out.
     """
 
     technique: str = ""
     includes_direct: bool = False
+    notes: tuple[str, ...] = ()
     params: dict
     stats: dict
 

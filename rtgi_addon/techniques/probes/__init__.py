@@ -8,15 +8,15 @@ What it is not: a lattice knows nothing of what happens between its points; see 
 weights make of that. Glossy reflection is treated as diffuse of the same albedo.
 """
 
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict
 
 import numpy as np
 
 from ...errors import BakeError
 from ...progress import Progress
-from ...scene import ProbeVolume, Scene
+from ...scene import Scene
 from ...transport.context import LightContext
-from ..base import Checkpoint, Field, Technique, validate_settings
+from ..base import Checkpoint, Field, Technique, validate_settings, volumes_by_settings
 from .bake import ProbeBake
 from .dilation import dilate
 from .field import ProbeField
@@ -43,7 +43,7 @@ class Probes(Technique):
         progress.step(0.0, "building the ray tracer")
         context = LightContext(scene, threads)
         bakes, start, probes = [], 0, sum(int(np.prod(volume.resolution)) for volume in scene.volumes)
-        for number, (own, volumes) in enumerate(_by_settings(scene.volumes, settings)):
+        for number, (own, volumes) in enumerate(volumes_by_settings(scene.volumes, settings)):
             count = sum(int(np.prod(volume.resolution)) for volume in volumes)
             span = progress.span(start / probes, (start + count) / probes)
             bake = ProbeBake(context, volumes, own, seed, span, checkpoint or Checkpoint(), f"probes-{number}")
@@ -52,17 +52,6 @@ class Probes(Technique):
             start += count
         progress.stage("field")
         return _field(scene, settings, bakes, [bake.grids() for bake in bakes])
-
-
-def _by_settings(volumes: tuple[ProbeVolume, ...], settings: ProbeSettings):
-    """Volumes grouped by their settings, where a volume's own overrides replace the bake's."""
-    groups: dict[ProbeSettings, list[ProbeVolume]] = {}
-    for volume in volumes:
-        known = {item.name for item in fields(settings)}
-        own = replace(settings, **{name: value for name, value in volume.settings.items() if name in known})
-        validate_settings(own)
-        groups.setdefault(own, []).append(volume)
-    return [(own, tuple(members)) for own, members in groups.items()]
 
 
 def _field(scene: Scene, settings: ProbeSettings, bakes: list[ProbeBake], grids) -> ProbeField:
