@@ -1,0 +1,248 @@
+"""The gather: irradiance, or SH of radiance, at receivers from the texels of reflective shadow maps.
+
+Source: C. Dachsbacher and M. Stamminger, "Reflective Shadow Maps", I3D 2005, eq. 1 and section 3.2. A texel p of flux Φ gives
+
+    E = Φ/π · ⟨n_p, x − x_p⟩₊ · ⟨n, x_p − x⟩₊ / (|x − x_p|² · (|x − x_p|² + A/π))
+
+which is the paper's eq. 1 with the 1/π that it leaves out, and with the texel taken as a disk of its area A: irradiance then never
+exceeds the texel's exitance Φ/A, where the paper's point has a pole.
+
+Sampling: the paper's disk lies around the receiver's projection into the map, at radius R·ξ₁ with weight ξ₁². That weight belongs
+to the density 1/ξ₁², while its radii have 1/ξ₁, so its sum is biased towards far texels. Here the radius is R·ξ₁^(3/2): its density
+over the map is 1/(3πR²ξ₁²), and weights proportional to ξ₁² are then exact. The other samples follow the texels' flux over the
+whole map, and both are weighted by the balance heuristic (Veach and Guibas 1995), so that the mean is the sum over all texels; with
+no such samples what lies outside the disk is lost, as in the paper. One low-discrepancy pattern serves all, shifted on the torus
+for each receiver (Cranley and Patterson 1976), which turns the disk and shuffles its radii.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ...numerics import sh
+from ...numerics.sampling import hash_u32, r2
+from ...transport.direct import SHORTENING
+from ...transport.parallel import CHUNK, chunks, parallel_for
+from ...transport.rays import SELF_INTERSECTION, offset_origins
+from ...transport.reflective_shadow_map import ReflectiveShadowMap
+from ...transport.vectors import luminance
+
+# Receivers × texels held at once: their temporaries stay in cache.
+PAIRS = CHUNK
+# Flux is quantized to integers of this many bits in all, so that float32 finds the very texel that the density belongs to.
+FLUX_BITS = 24
+# A texel seen at a slant reaches far; as a disk it is taken to be at most this many times as large as one seen head-on.
+MAX_SLANT = 10.0
+# Of a lamp's samples half go to its maps alike (one may lie right beside a receiver) and half by flux; no map gets fewer than this.
+MIN_SAMPLES = 4
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """How receivers choose texels: ``samples`` a lamp, ``disk_share`` of them within ``disk_radius`` [sides of the map]."""
+
+    samples: int = 400
+    disk_radius: float = 0.3
+    disk_share: float = 0.5
+    seed: int = 0
+
+
+class GatherMap:
+    """A reflective shadow map as rows that a gather reads, with the density by which it samples them.
+
+    ``rows`` (texels, 12) float32: position 0:3, normal 3:6, flux/π 6:9, area/π 9, density over the unit square of samples that
+    follow the flux 10, and 0. ``cumulative`` (texels,) int64: running sum of the quantized flux, row by row; ``samples`` is this
+    map's part of its lamp's.
+    """
+
+    def __init__(self, shadow_map: ReflectiveShadowMap, samples: int):
+        self.map, self.samples = shadow_map, samples
+        self.view = shadow_map.view
+        flux = shadow_map.flux.reshape(-1, 3)
+        self.rows = np.zeros((len(flux), 12), np.float32)
+        self.rows[:, 0:3] = shadow_map.position.reshape(-1, 3)
+        self.rows[:, 3:6] = shadow_map.normal.reshape(-1, 3)
+        self.rows[:, 6:9] = flux * np.float32(1.0 / np.pi)
+        self.rows[:, 9] = self._areas() * np.float32(1.0 / np.pi)
+        strength = luminance(flux).astype(np.float64)
+        lit = strength > 0
+        quantized = np.where(lit, np.floor(strength / strength.sum() * (2**FLUX_BITS - lit.sum())) + 1, 0).astype(np.int64)
+        self.cumulative = np.cumsum(quantized)
+        self.rows[:, 10] = quantized * (len(flux) / self.cumulative[-1])
+
+    @cached_property
+    def lit(self) -> np.ndarray:
+        """The rows whose flux is not zero."""
+        return self.rows[np.any(self.rows[:, 6:9] > 0, axis=1)]
+
+    def centres(self, points: np.ndarray) -> np.ndarray:
+        """Where receivers (n, 3) project into the unit square (n, 2) float32: the nearest point of it for those outside."""
+        homogeneous = np.asarray(points, np.float64) @ self.view.clip_from_world[:, :3].T + self.view.clip_from_world[:, 3]
+        # Behind the pinhole the same formula, with a depth that is just not zero, leads to the edge on the receiver's side.
+        depth = np.maximum(homogeneous[:, 3], 1e-6 * np.abs(homogeneous[:, :2]).max(axis=1) + 1e-30)
+        return np.clip(0.5 + 0.5 * homogeneous[:, :2] / depth[:, None], 0.0, 1.0).astype(np.float32)
+
+    def _areas(self) -> np.ndarray:
+        """Surface (texels,) [m²] that each texel covers."""
+        offset = self.rows[:, 0:3].astype(np.float64) - self.view.position_world
+        measure = self.view.texel_measure().ravel()
+        head_on = measure if self.view.orthographic else measure * np.sum(offset**2, axis=1)
+        cosine = np.abs(np.sum(self.view.directions() * self.rows[:, 3:6], axis=1))
+        return head_on / np.maximum(cosine, 1.0 / MAX_SLANT)
+
+
+def prepare(maps: tuple[ReflectiveShadowMap, ...], samples: int) -> tuple[GatherMap, ...]:
+    """Maps ready to be gathered from, each with its part of the ``samples`` of its lamp. Those without flux are left out."""
+    strength = np.array([float(luminance(item.total_flux)) for item in maps])
+    maps, strength = [item for item, flux in zip(maps, strength, strict=True) if flux > 0], strength[strength > 0]
+    lamp = np.array([item.view.lamp for item in maps], np.intp)
+    share = 0.5 / np.maximum(np.bincount(lamp)[lamp], 1) + 0.5 * strength / np.bincount(lamp, strength)[lamp] if maps else ()
+    return tuple(GatherMap(item, max(MIN_SAMPLES, round(samples * part))) for item, part in zip(maps, share, strict=True))
+
+
+def gather(maps: tuple[GatherMap, ...], points: np.ndarray, normals: np.ndarray, pattern: Pattern, *, tracer=None,
+           threads: int | None = None) -> np.ndarray:
+    """Irradiance (n, 3) float32 [W·m⁻²] at ``points`` (n, 3) with unit ``normals`` (n, 3) from sampled texels.
+
+    Without a ``tracer`` nothing is in the way, as in the paper; with one a shadow ray decides for every sample.
+    """
+    def estimate(rows):
+        x, n = points[rows], normals[rows]
+        return sum(_irradiance(*_sample(item, x, pattern), x, n, tracer) for item in maps)
+
+    points, normals = (np.ascontiguousarray(part, np.float32) for part in (points, normals))
+    return _over_receivers(estimate, maps, len(points), 1, max((item.samples for item in maps), default=1), threads)[:, 0]
+
+
+def gather_sh(maps: tuple[GatherMap, ...], points: np.ndarray, order: int, pattern: Pattern, *, tracer=None,
+              threads: int | None = None) -> np.ndarray:
+    """SH coefficients (n, (order + 1)², 3) float32 of the radiance that arrives at free ``points`` (n, 3) from sampled texels."""
+    def estimate(rows):
+        x = points[rows]
+        return sum(_projection(*_sample(item, x, pattern), x, order, tracer) for item in maps)
+
+    points = np.ascontiguousarray(points, np.float32)
+    most = max((item.samples for item in maps), default=1)
+    return _over_receivers(estimate, maps, len(points), sh.coefficient_count(order), most, threads)
+
+
+def gather_every_texel(maps: tuple[GatherMap, ...], points: np.ndarray, normals: np.ndarray | None, *, order: int = 0,
+                       tracer=None, threads: int | None = None) -> np.ndarray:
+    """The sum that ``gather`` estimates, over all texels: (n, 3), or without ``normals`` the one of ``gather_sh``."""
+    def estimate(rows):
+        x, total = points[rows], 0
+        for item in maps:
+            for span in chunks(len(item.lit), PAIRS):
+                texels = item.lit[span][None]
+                weight = np.ones((1, texels.shape[1]), np.float32)
+                total = total + (_projection(texels, weight, x, order, tracer) if normals is None
+                                 else _irradiance(texels, weight, x, normals[rows], tracer))
+        return total
+
+    points = np.ascontiguousarray(points, np.float32)
+    width = 1
+    if normals is None:
+        width = sh.coefficient_count(order)
+    else:
+        normals = np.ascontiguousarray(normals, np.float32)
+    most = min(max((len(item.lit) for item in maps), default=1), PAIRS)
+    result = _over_receivers(estimate, maps, len(points), width, most, threads)
+    return result if normals is None else result[:, 0]
+
+
+def rotations(points: np.ndarray, seed: int) -> np.ndarray:
+    """The shift (n, 2) float32 in [0, 1) of the pattern at each of ``points`` (n, 3) float32: a hash of the seed and position."""
+    # Adding zero makes −0 the same place as 0.
+    bits = (np.ascontiguousarray(points, np.float32) + np.float32(0.0)).view(np.uint32)
+    state = hash_u32(seed, bits[:, 0], bits[:, 1], bits[:, 2])
+    return np.stack([hash_u32(state, d) >> np.uint32(8) for d in range(2)], axis=-1).astype(np.float32) * np.float32(2.0**-24)
+
+
+def _over_receivers(estimate, maps, count: int, width: int, pairs: int, threads) -> np.ndarray:
+    result = np.zeros((count, width, 3), np.float32)
+    if not maps:
+        return result
+    spans = chunks(count, max(1, PAIRS // pairs))
+    for span, part in zip(spans, parallel_for(lambda i: estimate(spans[i]), len(spans), threads), strict=True):
+        result[span] = part
+    return result
+
+
+def _sample(item: GatherMap, points: np.ndarray, pattern: Pattern) -> tuple[np.ndarray, np.ndarray]:
+    """Texels (n, s, 12) for receivers (n, 3), and how many texels each sample stands for (n, s)."""
+    size, radius = item.view.resolution, np.float32(pattern.disk_radius)
+    in_disk = round(item.samples * pattern.disk_share)
+    by_flux = item.samples - in_disk
+    centre = item.centres(points)[:, None]
+    shift = rotations(points, pattern.seed)[:, None]
+    places, indices = [], []
+    if in_disk:
+        xi = np.mod(r2(in_disk, pattern.seed)[None] + shift, np.float32(1.0))
+        angle = xi[..., 1] * np.float32(2.0 * np.pi)
+        reach = (radius * xi[..., 0] * np.sqrt(xi[..., 0]))[..., None]
+        place = centre + reach * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        texel = np.floor(place * size).astype(np.int32)
+        inside = np.all((texel >= 0) & (texel < size), axis=-1)
+        places.append(place)
+        indices.append(np.where(inside, texel[..., 1] * size + texel[..., 0], -1))
+    if by_flux:
+        xi = np.mod(r2(by_flux, pattern.seed + 1)[None] + shift, np.float32(1.0))
+        target = xi[..., 0].astype(np.float64) * item.cumulative[-1]
+        index = np.searchsorted(item.cumulative, target, side="right")
+        low = np.where(index > 0, item.cumulative[index - 1], 0)
+        within = (target - low) / (item.cumulative[index] - low)
+        row, column = np.divmod(index, size)
+        places.append((np.stack([column + xi[..., 1], row + within], axis=-1) / size).astype(np.float32))
+        indices.append(index)
+    place, index = np.concatenate(places, axis=1), np.concatenate(indices, axis=1)
+    texels = np.take(item.rows, np.maximum(index, 0), axis=0)
+    squared = np.sum(np.square((place - centre) / radius), axis=-1)
+    disk = np.where(squared < 1, np.maximum(squared, np.float32(1e-12)) ** np.float32(-2.0 / 3.0), np.float32(0.0))
+    density = disk * np.float32(in_disk / (3.0 * np.pi * pattern.disk_radius**2)) + texels[..., 10] * np.float32(by_flux)
+    return texels, np.where((index >= 0) & (density > 0), np.float32(size * size) / np.maximum(density, 1e-30), np.float32(0.0))
+
+
+def _arrival(texels, points):
+    """Unit directions (n, s, 3) from receivers (n, 3) to ``texels`` (n or 1, s, 12), distances (n, s), and irradiance (n, s) on a
+    facing plane per flux/π."""
+    towards = texels[..., 0:3] - points[:, None]
+    squared = towards[..., 0] ** 2 + towards[..., 1] ** 2 + towards[..., 2] ** 2
+    distance = np.sqrt(np.maximum(squared, np.finfo(np.float32).tiny))
+    direction = towards / distance[..., None]
+    normal = texels[..., 3:6]
+    leaving = -(normal[..., 0] * direction[..., 0] + normal[..., 1] * direction[..., 1] + normal[..., 2] * direction[..., 2])
+    # A texel right at the receiver, or one with nothing in it, has no area to be regular by.
+    return direction, distance, np.maximum(leaving, 0.0) / np.maximum(squared + texels[..., 9], np.float32(1e-20))
+
+
+def _irradiance(texels, weight, points, normals, tracer) -> np.ndarray:
+    """(n, 1, 3) from ``texels`` (n or 1, s, 12), each counted ``weight`` times."""
+    direction, distance, strength = _arrival(texels, points)
+    n = normals[:, None]
+    cosine = n[..., 0] * direction[..., 0] + n[..., 1] * direction[..., 1] + n[..., 2] * direction[..., 2]
+    strength = strength * np.maximum(cosine, 0.0) * weight
+    if tracer is not None:
+        _shadow(strength, texels, offset_origins(points, normals, normals), direction, distance, tracer)
+    return np.stack([(strength * texels[..., 6 + channel]).sum(axis=1) for channel in range(3)], axis=-1)[:, None]
+
+
+def _projection(texels, weight, points, order, tracer) -> np.ndarray:
+    """(n, (order + 1)², 3): radiance from ``texels`` (n or 1, s, 12) as SH, each counted ``weight`` times."""
+    direction, distance, strength = _arrival(texels, points)
+    strength = strength * weight
+    if tracer is not None:
+        _shadow(strength, texels, points, direction, distance, tracer)
+    basis = sh.evaluate(direction, order)
+    return np.matmul(basis.swapaxes(1, 2), strength[..., None] * texels[..., 6:9])
+
+
+def _shadow(strength, texels, origins, direction, distance, tracer) -> None:
+    """Set ``strength`` (n, s) to 0 where something lies between receivers and texels."""
+    receiver, sample = np.nonzero(strength > 0)
+    origins, direction = origins[receiver], direction[receiver, sample]
+    targets = texels[receiver if len(texels) > 1 else 0, sample, 0:3]
+    reach = np.maximum(np.abs(targets).max(axis=1), np.abs(origins).max(axis=1))
+    limits = np.maximum(distance[receiver, sample] * (1 - SHORTENING) - 4 * SELF_INTERSECTION * reach, 0.0)
+    blocked = tracer.occluded(origins, direction, limits)
+    strength[receiver[blocked], sample[blocked]] = 0.0
