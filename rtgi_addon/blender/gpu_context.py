@@ -1,0 +1,49 @@
+"""Opening a GPU context in a Blender that has no window."""
+
+import bpy
+
+from ..errors import BakeError
+from ..preview import context
+
+
+def open_context() -> None:
+    """Make Blender's gpu module usable on this, the main thread; at once where it already is. Raises BakeError where none can be."""
+    if context.is_open():
+        return
+    if not bpy.app.background:
+        raise BakeError("Blender has a window but no GPU context on this thread", "bake from the panel, or use --device cpu")
+    context.require_driver()
+    if not context.initialise():
+        _render_once()
+    context.require()
+
+
+class _Starter(bpy.types.RenderEngine):
+    """Draws nothing. That it asks for the GPU makes Blender open its context, which then stays open."""
+
+    bl_idname = "RTGI_GPU_STARTER"
+    bl_label = "RTGI GPU starter"
+    bl_use_gpu_context = True
+
+    def render(self, depsgraph):
+        """Leave the picture empty."""
+
+
+def _render_once() -> None:
+    """Before Blender 5.2: render 8 × 8 pixels of a scene of our own, and leave nothing of it behind. (Blender 4.5 hangs at exit if
+    an engine that has rendered is still registered.)"""
+    bpy.utils.register_class(_Starter)
+    scene = bpy.data.scenes.new("RTGI GPU starter")
+    camera = bpy.data.cameras.new("RTGI GPU starter")
+    eye = bpy.data.objects.new("RTGI GPU starter", camera)
+    try:
+        scene.collection.objects.link(eye)
+        scene.camera = eye
+        scene.render.engine = _Starter.bl_idname
+        scene.render.resolution_x = scene.render.resolution_y = 8
+        bpy.ops.render.render(scene=scene.name)
+    finally:
+        bpy.data.scenes.remove(scene)
+        bpy.data.objects.remove(eye)
+        bpy.data.cameras.remove(camera)
+        bpy.utils.unregister_class(_Starter)

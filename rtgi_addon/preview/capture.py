@@ -1,0 +1,34 @@
+"""Reflective shadow maps by rasterization: the twin of transport/reflective_shadow_map.py, `capture`.
+
+Agrees with the rays texel by texel but where a texel's centre lies on an edge, and for coverage without a threshold, where each
+throws its own coins.
+"""
+
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from ..transport.reflective_shadow_map import ReflectiveShadowMap
+from ..transport.shadow_views import ShadowView, texel_power
+from .device import RenderTarget
+from .surfaces import SurfacePass, View, decode_primitive
+from .textures import download, upload
+
+# The surfaces of a scene stay on the GPU as long as its geometry lives: a lamp is seen from several sides, and moves.
+_passes: WeakKeyDictionary = WeakKeyDictionary()
+
+
+def capture(context, view: ShadowView) -> ReflectiveShadowMap:
+    """Fill ``view`` by drawing the scene."""
+    if context.geometry not in _passes:
+        _passes[context.geometry] = SurfacePass(context.scene, context.geometry, "rsm_capture")
+    size = view.resolution
+    power = np.ones((size, size, 4), np.float32)
+    power[..., :3] = texel_power(context.scene.lights[view.lamp], view)
+    target = RenderTarget(size, size, ("RGBA32F",) * 3, depth=True)
+    with target.drawing():
+        _passes[context.geometry].draw(View(view.clip_from_world, view.world_from_view, view.far, view.orthographic),
+                                       {"power": upload(power)})
+    position, normal, flux = (download(texture) for texture in target.colors)
+    primitive = decode_primitive(position, normal)
+    return ReflectiveShadowMap(view, *(np.ascontiguousarray(part[..., :3]) for part in (position, normal, flux)), primitive)

@@ -1,0 +1,57 @@
+"""Every program of the product, described once (see `program`)."""
+
+from functools import cache
+
+from ..transport.surfaces import MAX_ALBEDO
+from .program import Image, Program
+from .uniforms import UniformStruct
+
+# The material inputs in the order of include/material.glsl.
+MATERIAL_INPUTS = ("albedo", "emission", "alpha", "base_color", "metallic", "roughness")
+
+MATERIAL = UniformStruct("MaterialInputs", (
+    ("vec4", "factor", 6), ("vec4", "addend", 6), ("vec4", "uv_row_x", 6), ("vec4", "uv_row_y", 6),
+    ("ivec4", "source", 6), ("ivec4", "filtering", 6),
+    # Alpha threshold (−1: a coin), the draw's first instance, 1 if it can be transparent.
+    ("vec4", "surface"),
+))
+VIEW = UniformStruct("ViewTransform", (
+    ("mat4", "clip_from_world"), ("vec3", "position_world"), ("float", "far"), ("vec3", "forward_world"), ("int", "orthographic"),
+))
+
+# What each pass over the scene's surfaces reads of a material, and its render targets.
+SURFACE_PASSES = {
+    "rsm_capture": (("albedo", "alpha"), ("position", "normal", "flux")),
+    "gbuffer": (MATERIAL_INPUTS, ("position", "normal", "albedo", "base_color", "emission")),
+}
+
+
+@cache
+def surface_program(name: str, uv_count: int, color_count: int, smooth: bool) -> Program:
+    """A pass of SURFACE_PASSES for triangles with that many UV maps and colour attributes, smooth or flat."""
+    inputs, outputs = SURFACE_PASSES[name]
+    uvs, colors = range(uv_count), range(color_count)
+    defines = [
+        ("MAX_ALBEDO", repr(float(MAX_ALBEDO))),
+        ("COPY_UVS", " ".join(f"uv{k} = uv_{k};" for k in uvs)),
+        ("COPY_COLORS", " ".join(f"color{k} = color_{k};" for k in colors)),
+        ("SELECT_UV", " ".join(f"if (slot == {k}) {{ return uv{k}; }}" for k in uvs)),
+        ("SELECT_COLOR", " ".join(f"if (slot == {k}) {{ return color{k}; }}" for k in colors)),
+    ]
+    attributes = [("VEC3", "position"), ("VEC3", "face_normal"), ("INT", "triangle")]
+    varyings = [("VEC3", "position_world")]
+    if smooth:
+        defines.append(("SMOOTH", "1"))
+        attributes.append(("VEC3", "normal"))
+        varyings.append(("VEC3", "normal_world"))
+    attributes += [*(("VEC2", f"uv_{k}") for k in uvs), *(("VEC3", f"color_{k}") for k in colors)]
+    varyings += [*(("VEC2", f"uv{k}") for k in uvs), *(("VEC3", f"color{k}") for k in colors)]
+    return Program(
+        name, vertex="surface", uniforms=(("view", VIEW), ("material", MATERIAL)),
+        samplers=("instances", *(f"{item}_image" for item in inputs), *(("power",) if name == "rsm_capture" else ())),
+        inputs=tuple(attributes), varyings=tuple(varyings),
+        flat_varyings=(("VEC3", "face_normal_world"), ("INT", "primitive"), ("INT", "instance_index")),
+        outputs=tuple(("VEC4", f"out_{output}") for output in outputs), writes_depth=True, defines=tuple(defines))
+
+
+__all__ = ["MATERIAL", "MATERIAL_INPUTS", "SURFACE_PASSES", "VIEW", "Image", "Program", "surface_program"]

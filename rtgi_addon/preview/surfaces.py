@@ -1,0 +1,129 @@
+"""The scene's surfaces on the GPU, and the pass that draws them: for shadow maps and for a camera's G-buffer alike.
+
+A draw is one mesh's triangles of one material for all instances that have it; where a texel is covered by several, the nearest
+along the view wins, as for a ray through its centre.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import gpu
+import numpy as np
+
+from ..scene import Material, Mesh, Scene
+from ..transport.geometry import Geometry
+from .device import bind, uniform_buffer, vertex_buffer
+from .materials import Images, Slots, uniforms
+from .programs import MATERIAL, SURFACE_PASSES, VIEW, surface_program
+from .textures import FOLD_WIDTH, fold, upload
+
+_TEXELS_PER_INSTANCE = 6
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """Where from and how the scene is drawn: ``clip_from_world`` (4, 4), ``world_from_view`` (4, 4) looking along −Z."""
+
+    clip_from_world: np.ndarray
+    world_from_view: np.ndarray
+    far: float
+    orthographic: bool
+
+    @property
+    def uniforms(self) -> dict:
+        """Values of the struct VIEW."""
+        return {"clip_from_world": self.clip_from_world, "position_world": self.world_from_view[:3, 3], "far": self.far,
+                "forward_world": -self.world_from_view[:3, 2], "orthographic": int(self.orthographic)}
+
+
+@dataclass(frozen=True, eq=False)
+class _Draw:
+    program: object
+    batch: gpu.types.GPUBatch
+    material: gpu.types.GPUUniformBuf
+    images: dict[str, gpu.types.GPUTexture]
+    count: int
+    culls: bool
+
+
+class SurfacePass:
+    """One of SURFACE_PASSES over the surfaces of ``scene``, whose triangles are numbered as in ``geometry``."""
+
+    def __init__(self, scene: Scene, geometry: Geometry, name: str, images: Images | None = None):
+        self._inputs, self._name = SURFACE_PASSES[name][0], name
+        self._images = images or Images()
+        groups: dict[tuple, list[int]] = {}
+        for index, instance in enumerate(scene.instances):
+            override = tuple(sorted((instance.material_override or {}).items()))
+            groups.setdefault((instance.mesh, override), []).append(index)
+        ordered = [index for members in groups.values() for index in members]
+        width = FOLD_WIDTH // _TEXELS_PER_INSTANCE * _TEXELS_PER_INSTANCE
+        self._instances = upload(fold(_instance_rows(scene, geometry)[ordered].reshape(-1, 4), width))
+        self._draws, first = [], 0
+        materials = scene.materials or (Material("default"),)
+        for (mesh_index, override), members in groups.items():
+            mesh = scene.meshes[mesh_index]
+            for old in np.unique(mesh.triangle_material):
+                material = materials[dict(override).get(int(old), int(old))]
+                triangles = np.flatnonzero(mesh.triangle_material == old).astype(np.int32)
+                self._draws.append(self._draw_of(mesh, triangles, material, first, len(members)))
+            first += len(members)
+
+    def _draw_of(self, mesh: Mesh, triangles: np.ndarray, material: Material, first: int, count: int) -> _Draw:
+        slots = Slots(material, self._inputs)
+        smooth = mesh.corner_normals_local is not None
+        program = surface_program(self._name, len(slots.uv_layers), len(slots.attributes), smooth)
+        batch = gpu.types.GPUBatch(type="TRIS", buf=vertex_buffer(_attributes(mesh, triangles, slots)))
+        buffer = uniform_buffer(MATERIAL, uniforms(material, slots, self._inputs, first))
+        images = {f"{name}_image": self._images.get(getattr(material, name).texture) for name in self._inputs}
+        return _Draw(program, batch, buffer, images, count, material.backface_culling)
+
+    def draw(self, view: View, samplers: Mapping[str, gpu.types.GPUTexture] | None = None, *, cull: bool = False) -> None:
+        """Draw everything into the target that is bound. ``cull`` leaves out the backs of materials that say so."""
+        shared = uniform_buffer(VIEW, view.uniforms)
+        for draw in self._draws:
+            gpu.state.face_culling_set("BACK" if cull and draw.culls else "NONE")
+            shader, _alive = bind(draw.program, uniforms={"view": shared, "material": draw.material},
+                                  samplers={"instances": self._instances, **draw.images, **(samplers or {})})
+            draw.batch.draw_instanced(shader, instance_start=0, instance_count=draw.count)
+
+
+def decode_primitive(position: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """Triangle indices (h, w) int32 from the fourth components of the position and normal targets; −1 where nothing was drawn."""
+    return position[..., 3].astype(np.int32) * 65536 + normal[..., 3].astype(np.int32) - 1
+
+
+def _instance_rows(scene: Scene, geometry: Geometry) -> np.ndarray:
+    """(i, 6, 4) float32: what surface.vert.glsl reads of every instance."""
+    counts = [len(scene.meshes[instance.mesh].triangles) for instance in scene.instances]
+    starts = np.cumsum([0, *counts[:-1]])
+    rows = np.zeros((len(counts), _TEXELS_PER_INSTANCE, 4), np.float32)
+    rows[:, :3] = [np.asarray(instance.world_from_local)[:3] for instance in scene.instances]
+    # Scaled to a largest element of 1: the cofactors of a tiny instance underflow when they are squared.
+    matrices = geometry.normal_matrices
+    rows[:, 3:, :3] = matrices / np.maximum(np.abs(matrices).max(axis=(1, 2), keepdims=True), np.finfo(np.float32).tiny)
+    rows[:, 3, 3], rows[:, 4, 3], rows[:, 5, 3] = starts // 65536, starts % 65536, np.arange(len(counts))
+    return rows
+
+
+def _attributes(mesh: Mesh, triangles: np.ndarray, slots: Slots) -> dict[str, np.ndarray]:
+    """Vertex attributes (3t, c) of some of the mesh's triangles; zero where the mesh lacks a UV map or an attribute."""
+    corners = mesh.vertices_local[mesh.triangles[triangles]]
+    face_normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(face_normals, axis=1, keepdims=True)
+    face_normals = face_normals / np.maximum(length, np.finfo(np.float32).tiny)
+    found = {"position": corners, "face_normal": np.repeat(face_normals, 3, axis=0), "triangle": np.repeat(triangles, 3)[:, None]}
+    if mesh.corner_normals_local is not None:
+        found["normal"] = _unit(mesh.corner_normals_local[triangles])
+    for k, layer in enumerate(slots.uv_layers):
+        uv = mesh.uv_layers.get(layer if layer is not None else mesh.active_uv)
+        found[f"uv_{k}"] = np.zeros((3 * len(triangles), 2), np.float32) if uv is None else uv[triangles]
+    for k, name in enumerate(slots.attributes):
+        colors = mesh.attributes.get(name)
+        found[f"color_{k}"] = np.zeros((3 * len(triangles), 3), np.float32) if colors is None else colors[triangles][..., :3]
+    return {name: values.reshape(3 * len(triangles), -1).astype(np.int32 if name == "triangle" else np.float32)
+            for name, values in found.items()}
+
+
+def _unit(normals: np.ndarray) -> np.ndarray:
+    return normals / np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-30)

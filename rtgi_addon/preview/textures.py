@@ -1,0 +1,65 @@
+"""Arrays to textures and back.
+
+Blender's module reads 3D textures and layers wrongly before 5.2 and has no storage buffers, so everything is a 2D texture of
+floats: lists are folded into rows (``fold``), volumes into tiles (see `atlas`).
+"""
+
+import gpu
+import numpy as np
+
+from ..errors import BakeError
+
+CHANNELS = {"R32F": 1, "RGBA32F": 4, "RGBA16F": 4, "RGBA8": 4}
+# Wide enough for a GPU, and low enough that a list of millions stays below the largest texture.
+FOLD_WIDTH = 4096
+
+
+def upload(values: np.ndarray, format: str | None = None) -> gpu.types.GPUTexture:
+    """A texture from ``values`` (h, w) or (h, w, 4), row 0 at the bottom; float32 R32F or RGBA32F unless ``format`` says otherwise
+    (a normalized format takes floats from 0 to 1). Raises BakeError beyond the GPU's largest texture."""
+    values = np.ascontiguousarray(values, np.float32)
+    height, width = values.shape[:2]
+    _require_size(width, height)
+    format = format or ("R32F" if values.ndim == 2 else "RGBA32F")
+    # The buffer is the array itself: both must live until the texture has taken it in, which is when this returns.
+    return gpu.types.GPUTexture((width, height), format=format, data=gpu.types.Buffer("FLOAT", values.size, values))
+
+
+def empty(width: int, height: int, format: str = "RGBA32F") -> gpu.types.GPUTexture:
+    """A texture of zeros. Raises BakeError beyond the GPU's largest texture."""
+    _require_size(width, height)
+    texture = gpu.types.GPUTexture((width, height), format=format)
+    if not format.startswith("DEPTH"):
+        texture.clear(format="FLOAT", value=(0.0,) * CHANNELS[format])
+    return texture
+
+
+def download(texture: gpu.types.GPUTexture) -> np.ndarray:
+    """(h, w) or (h, w, 4) float32, row 0 at the bottom."""
+    channels = CHANNELS[texture.format]
+    buffer = texture.read()
+    # With the dimensions that read() gives, the buffer protocol hands out rows in the wrong order.
+    buffer.dimensions = texture.width * texture.height * channels
+    shape = (texture.height, texture.width) if channels == 1 else (texture.height, texture.width, channels)
+    return np.frombuffer(buffer, np.float32).reshape(shape).copy()
+
+
+def fold(rows: np.ndarray, width: int = FOLD_WIDTH) -> np.ndarray:
+    """A list (n, c ≤ 4) as texels (h, w, 4): item i stands at column i mod w, row i div w."""
+    n, channels = rows.shape
+    width = max(min(n, width), 1)
+    texels = np.zeros((max(-(-n // width), 1), width, 4), np.float32)
+    texels.reshape(-1, 4)[:n, :channels] = rows
+    return texels
+
+
+def unfold(texels: np.ndarray, n: int, channels: int) -> np.ndarray:
+    """The first ``n`` items (n, channels) of what ``fold`` made."""
+    return np.ascontiguousarray(texels.reshape(-1, 4)[:n, :channels])
+
+
+def _require_size(width: int, height: int) -> None:
+    limit = gpu.capabilities.max_texture_size_get()
+    if max(width, height) > limit:
+        raise BakeError(f"a texture of {width} × {height} is larger than this GPU's limit of {limit}",
+                        "use a lower resolution, or --device cpu")
