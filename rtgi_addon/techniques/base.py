@@ -126,10 +126,15 @@ class Checkpoint:
         return None
 
 
+# What indirect irradiance is made of (PHYSICS.md §1).
+KNOWN_LIGHT = frozenset({"lamps", "emissive surfaces", "world", "bounces"})
+
+
 class Technique(ABC):
     """One GI technique: a name, a frozen ``Settings`` dataclass, and ``bake``.
 
-    ``tolerance`` is the relative error of irradiance that it declares for scenes with a closed form, at default settings.
+    ``tolerance`` is the relative error of irradiance that it declares for scenes with a closed form, at default settings;
+    ``knows`` names the light in its fields, of KNOWN_LIGHT; without "bounces" they hold the first bounce of it.
     """
 
     name: ClassVar[str]
@@ -137,6 +142,7 @@ class Technique(ABC):
     description: ClassVar[str]
     Settings: ClassVar[type]
     tolerance: ClassVar[float] = 0.02
+    knows: ClassVar[frozenset[str]] = KNOWN_LIGHT
 
     @abstractmethod
     def bake(self, scene: Scene, settings, rng: np.random.Generator, progress: Progress, *, threads: int | None = None,

@@ -29,6 +29,7 @@ class ReflectiveShadowMaps(Technique):
     description = "One bounce of the lamps, gathered from what each of them lights first; without occlusion, as in the paper"
     Settings = RsmSettings
     tolerance = 0.05
+    knows = frozenset({"lamps"})
 
     def bake(self, scene: Scene, settings: RsmSettings, rng: np.random.Generator, progress: Progress, *,
              threads: int | None = None, checkpoint: Checkpoint | None = None, kernels: Kernels | None = None) -> Field:

@@ -44,7 +44,7 @@ class Pattern:
 
     samples: int = 400
     disk_radius: float = 0.3
-    disk_share: float = 0.5
+    disk_share: float = 0.4
     seed: int = 0
 
 
@@ -82,6 +82,21 @@ class GatherMap:
         # Behind the pinhole the same formula, with a depth that is just not zero, leads to the edge on the receiver's side.
         depth = np.maximum(homogeneous[:, 3], 1e-6 * np.abs(homogeneous[:, :2]).max(axis=1) + 1e-30)
         return np.clip(0.5 + 0.5 * homogeneous[:, :2] / depth[:, None], 0.0, 1.0).astype(np.float32)
+
+    def by_flux(self, xi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Texels (n, s), and places within them in the unit square (n, s, 2) float32, that follow the flux: ``xi`` (n, s, 2) chooses
+        a row by what it holds, then a texel of it, so that the points' evenness in two dimensions is kept."""
+        size, last = self.view.resolution, self.cumulative[self.view.resolution - 1::self.view.resolution]
+        target = xi[..., 1].astype(np.float64) * last[-1]
+        row = np.searchsorted(last, target, side="right")
+        low = np.where(row > 0, last[row - 1], 0)
+        total = last[row] - low
+        v = row + (target - low) / total
+        target = low + xi[..., 0].astype(np.float64) * total
+        index = np.searchsorted(self.cumulative, target, side="right")
+        low = np.where(index > 0, self.cumulative[index - 1], 0)
+        u = index - row * size + (target - low) / (self.cumulative[index] - low)
+        return index, (np.stack([u, v], axis=-1) / size).astype(np.float32)
 
     def _areas(self) -> np.ndarray:
         """Surface (texels,) [m²] that each texel covers."""
@@ -188,12 +203,8 @@ def _sample(item: GatherMap, points: np.ndarray, pattern: Pattern) -> tuple[np.n
         indices.append(np.where(inside, texel[..., 1] * size + texel[..., 0], -1))
     if by_flux:
         xi = np.mod(r2(by_flux, pattern.seed + 1)[None] + shift, np.float32(1.0))
-        target = xi[..., 0].astype(np.float64) * item.cumulative[-1]
-        index = np.searchsorted(item.cumulative, target, side="right")
-        low = np.where(index > 0, item.cumulative[index - 1], 0)
-        within = (target - low) / (item.cumulative[index] - low)
-        row, column = np.divmod(index, size)
-        places.append((np.stack([column + xi[..., 1], row + within], axis=-1) / size).astype(np.float32))
+        index, place = item.by_flux(xi)
+        places.append(place)
         indices.append(index)
     place, index = np.concatenate(places, axis=1), np.concatenate(indices, axis=1)
     texels = np.take(item.rows, np.maximum(index, 0), axis=0)

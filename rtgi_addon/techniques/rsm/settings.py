@@ -18,7 +18,7 @@ class RsmSettings:
                                "and leaks through walls")
     disk_radius: float = setting(0.3, "Disk Radius", "Radius of the importance disk around the projected receiver, in sides of "
                                  "the map", "", 0.01, 1.5)
-    disk_share: float = setting(0.5, "Disk Share", "Share of the samples in the disk; the others follow the flux. 1 is the "
+    disk_share: float = setting(0.4, "Disk Share", "Share of the samples in the disk; the others follow the flux. 1 is the "
                                 "paper's pattern, which misses what lies outside the disk", "", 0.0, 1.0)
     area_points: int = setting(4, "Points per Area Lamp", "From how many points an area lamp is captured", "", 1, 64)
     focus: float = setting(3.0, "Sun Focus", "A sun's map covers this many times the box around all volumes", "", 1.0, 1000.0)
