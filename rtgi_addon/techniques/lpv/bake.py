@@ -1,0 +1,108 @@
+"""One bake of light propagation volumes: geometry once, light as often as it changes."""
+
+from dataclasses import asdict
+
+import numpy as np
+
+from ...errors import BakeError
+from ...progress import Progress
+from ...scene import Scene
+from ...transport.context import LightContext
+from ..resample import resample
+from . import sources, surfels
+from .cascades import place_cascades
+from .field import LpvField
+from .gather import gather
+from .geometry_volume import Blocking, GeometryVolume, combine, face_blocking, inject_surfels, vacuum
+from .grid import LpvGrid, total_flux
+from .settings import LpvSettings
+
+
+class LpvBake:
+    """The cascades of a scene with what blocks light in them; ``light`` fills them for the context's lamps and world."""
+
+    def __init__(self, context: LightContext, settings: LpvSettings, seed: int, kernels, progress: Progress):
+        self.context, self.settings, self.seed, self.kernels = context, settings, seed, kernels
+        self.grids = place_cascades(context.scene, settings, np.array(context.geometry.bounds()))
+        self._maps = sources.capture_maps(context, kernels, self.grids, settings.map_resolution, progress.span(0.0, 0.5))
+        progress.step(0.5, "filling geometry volumes")
+        self.blocking = self._blocking()
+
+    def _blocking(self) -> list[Blocking]:
+        views = None
+        if self.settings.occluders == "views":
+            views = self._seen()
+        blocking = []
+        for level, grid in enumerate(self.grids):
+            volume = _geometry_volume(grid, views if views is not None else [[surfels.peel(self.context, grid)]])
+            if volume.is_empty:
+                raise BakeError(f"cascade {level} of the light propagation volumes ({_box(grid)}) holds no geometry",
+                                "move its center, raise cell_size, or bake the technique 'probes' there")
+            blocking.append(face_blocking(volume, self.settings.bounces) if self.settings.blocking else vacuum(grid))
+        return blocking
+
+    def _seen(self) -> list[list[surfels.Surfels]]:
+        """Surfels by eye: the views of one lamp see different surfaces, those of different lamps and cameras often the same."""
+        eyes = {}
+        for captured in self._maps:
+            origin = (captured.view.lamp, tuple(np.round(captured.view.position_world, 9)))
+            eyes.setdefault(origin, []).append(surfels.of_map(self.context, captured))
+        return [*eyes.values(), *([surfels.of_camera(self.context, camera)] for camera in self.context.scene.cameras)]
+
+    def light(self, progress: Progress) -> LpvField:
+        """Inject, propagate and accumulate, coarsest cascade first: what it holds at a finer one's border shines into that."""
+        context, settings = self.context, self.settings
+        lights = sources.joined([sources.lamp_lights(self._maps), sources.emissive_lights(context, self.seed)])
+        world = sources.world_lights(context, self.grids[-1], self.seed, progress.span(0.0, 0.2))
+        volumes: list[np.ndarray] = []
+        injected = 0.0
+        for level in reversed(range(len(self.grids))):
+            grid, coarser = self.grids[level], self.grids[level + 1:]
+            crossing = _crossing(grid, coarser, tuple(volumes)) if coarser else world
+            rows = sources.joined([lights, crossing])
+            volume = self.kernels.lpv_inject(grid, *rows)
+            if level == len(self.grids) - 1:
+                injected = total_flux(volume)
+                if len(rows.flux) and np.any(rows.flux > 0) and not np.any(injected > 0):
+                    raise BakeError("no virtual light lies inside the light propagation volumes", "raise cell_size or add cascades")
+            share = progress.span(1.0 - 0.8 * (level + 1) / len(self.grids), 1.0 - 0.8 * level / len(self.grids))
+            volumes.insert(0, self.kernels.lpv_propagate(volume, self.blocking[level], settings.steps, threads=context.threads,
+                                                         progress=share))
+        stats = {"rays": 0, "virtual_lights": len(lights.flux), "cells": sum(grid.count for grid in self.grids),
+                 "injected_flux": [float(value) for value in injected]}
+        return LpvField(self.grids, tuple(volumes), params=asdict(settings), stats=stats, resampled=self._resample,
+                        relit=self.relight, kernels=self.kernels)
+
+    def _resample(self, field: LpvField):
+        order = self.settings.order
+        return resample(field, self.context, self.context.scene.volumes, order, Progress(), seed=self.seed,
+                        threads=self.context.threads, radiance_sh=lambda points: field.radiance_sh(points, order))
+
+    def relight(self, scene: Scene, progress: Progress) -> LpvField:
+        """The field under another scene's lamps and world. Raises BakeError if geometry or materials differ."""
+        other = object.__new__(LpvBake)
+        other.__dict__.update(self.__dict__)
+        other.context = self.context.relit(scene)
+        other._maps = sources.capture_maps(other.context, self.kernels, self.grids, self.settings.map_resolution,
+                                           progress.span(0.0, 0.4))
+        return other.light(progress.span(0.4, 1.0))
+
+
+def _geometry_volume(grid: LpvGrid, eyes: list[list[surfels.Surfels]]) -> GeometryVolume:
+    """Each eye's surfels add up; of several eyes the one that sees most of a place counts there."""
+    volumes = []
+    for seen in eyes:
+        columns = zip(*((part.positions, part.normals, part.area, part.albedo) for part in seen), strict=True)
+        volumes.append(inject_surfels(grid, surfels.Surfels(*(np.concatenate(column) for column in columns))))
+    return combine(volumes or [inject_surfels(grid, surfels.Surfels(*(np.zeros(shape) for shape in ((0, 3), (0, 3), 0, (0, 3)))))])
+
+
+def _crossing(grid: LpvGrid, coarser: tuple[LpvGrid, ...], volumes: tuple[np.ndarray, ...]) -> sources.Lights:
+    """What a coarser cascade sends in through the border of ``grid``."""
+    positions, inward = sources.border(grid)
+    return sources.Lights(positions, inward, gather(coarser, volumes, positions, -inward, False) * np.float32(grid.cell**2))
+
+
+def _box(grid: LpvGrid) -> str:
+    low, high = (", ".join(f"{value:.3g}" for value in corner) for corner in (grid.corner, grid.high))
+    return f"from ({low}) to ({high})"
