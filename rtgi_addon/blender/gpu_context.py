@@ -7,7 +7,7 @@ from ..preview import context
 
 
 def open_context() -> None:
-    """Make Blender's gpu module usable on this, the main thread; at once where it already is. Raises BakeError where none can be."""
+    """Make Blender's gpu module usable on this, the main thread; nothing to do where it is. Raises BakeError where it cannot be."""
     if context.is_open():
         return
     if not bpy.app.background:

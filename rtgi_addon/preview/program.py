@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from .uniforms import UniformStruct
 
-GLSL_TYPES = {"FLOAT": "float", "VEC2": "vec2", "VEC3": "vec3", "VEC4": "vec4", "INT": "int", "IVEC2": "ivec2", "IVEC4": "ivec4"}
+GLSL_TYPES = {"FLOAT": "float", "VEC2": "vec2", "VEC3": "vec3", "VEC4": "vec4", "INT": "int"}
 
 
 @dataclass(frozen=True)
@@ -24,10 +24,10 @@ class Image:
 class Program:
     """A program made of the files ``shaders/NAME.STAGE.glsl``; ``vertex`` names another file for the vertex stage.
 
-    ``uniforms`` are (name, struct) of the buffers. ``samplers`` names the 2D float textures that it fetches from, ``images`` those it
-    writes. A compute program has a ``local_size``; a raster program has ``inputs`` (vertex attributes), ``varyings`` and ``outputs``
-    (one per render target), all (type, name) in GLSL_TYPES; ``flat_varyings`` are not interpolated. ``writes_depth`` says that the
-    fragment stage sets gl_FragDepth. ``defines`` are compile-time parameters: (name, value).
+    ``uniforms`` are (name, struct) of the buffers. ``samplers`` names the 2D float textures that it fetches from, ``images`` those
+    it writes. A compute program has a ``local_size``; a raster program has ``inputs`` (vertex attributes), ``varyings`` and
+    ``outputs`` (one per render target), all (type, name) in GLSL_TYPES; ``flat_varyings`` are not interpolated. ``writes_depth``
+    says that the fragment stage sets gl_FragDepth. ``defines`` are compile-time parameters: (name, value).
     """
 
     name: str

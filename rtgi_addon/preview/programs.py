@@ -54,4 +54,17 @@ def surface_program(name: str, uv_count: int, color_count: int, smooth: bool) ->
         outputs=tuple(("VEC4", f"out_{output}") for output in outputs), writes_depth=True, defines=tuple(defines))
 
 
-__all__ = ["MATERIAL", "MATERIAL_INPUTS", "SURFACE_PASSES", "VIEW", "Image", "Program", "surface_program"]
+_RGB = ("red", "green", "blue")
+_GROUP = (8, 8)
+
+LPV_INJECT = Program(
+    "lpv_inject", uniforms=(("parameters", UniformStruct("InjectParameters", (
+        ("ivec3", "resolution"), ("int", "columns"), ("vec2", "size"), ("float", "per_flux"), ("float", "per_vector")))),),
+    inputs=(("VEC3", "cell_position"), ("VEC3", "normal"), ("VEC3", "flux")),
+    flat_varyings=(("VEC4", "lobe"), ("VEC3", "light_flux")), outputs=tuple(("VEC4", f"out_{name}") for name in _RGB))
+
+LPV_PROPAGATE = Program(
+    "lpv_propagate", uniforms=(("parameters", UniformStruct("PropagateParameters", (
+        ("ivec3", "resolution"), ("int", "columns"), ("ivec2", "size"), ("float", "side_ahead"), ("int", "bounces")))),),
+    samplers=(*(f"light_{name}" for name in _RGB), "faces", "blockers"), local_size=_GROUP,
+    images=(*(Image(f"next_{name}") for name in _RGB), *(Image(f"total_{name}", access="READ_WRITE") for name in _RGB)))

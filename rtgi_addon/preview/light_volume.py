@@ -1,0 +1,119 @@
+"""Light propagation volumes on the GPU: injection and propagation (techniques/lpv/injection.py, propagation.py).
+
+Light is three textures, one a channel, each a volume's atlas of SH coefficients or fluxes: what stays on the GPU from injection to
+the gather while a lamp moves. The array functions at the end are the same with numpy arrays on both sides.
+"""
+
+import gpu
+import numpy as np
+
+from ..progress import Progress
+from ..techniques.lpv.geometry_volume import Blocking
+from ..techniques.lpv.grid import PER_FLUX, PER_VECTOR, SIDE_AHEAD, LpvGrid
+from .atlas import Atlas
+from .device import RenderTarget, bind, dispatch, vertex_buffer
+from .programs import LPV_INJECT, LPV_PROPAGATE
+from .textures import download, empty, upload
+
+_CHANNELS = ("red", "green", "blue")
+_BLOCK_COLUMNS = 4
+_UNIT = np.array([1.0 / PER_FLUX, *[1.0 / PER_VECTOR] * 3], np.float32)
+
+LightTextures = tuple[gpu.types.GPUTexture, gpu.types.GPUTexture, gpu.types.GPUTexture]
+
+
+def atlas_of(resolution) -> Atlas:
+    """The layout of a volume on this GPU, with room for the blocks of ``FaceTextures``. Raises BakeError for one too large."""
+    return Atlas.of(resolution, gpu.capabilities.max_texture_size_get() // _BLOCK_COLUMNS)
+
+
+def inject_lights(grid: LpvGrid, positions: np.ndarray, normals: np.ndarray, flux: np.ndarray) -> LightTextures:
+    """Coefficients of virtual lights as textures: every light is a point, blended additively into its cell's texel."""
+    atlas = atlas_of(grid.resolution)
+    target = RenderTarget(*atlas.size, ("RGBA32F",) * 3)
+    with target.drawing(blend="ADDITIVE_PREMULT"):
+        if len(positions):
+            # Relative to the volume in double precision: floats hold cells exactly wherever the volume stands.
+            vertices = {"cell_position": grid.cells_of(positions), "normal": normals, "flux": flux}
+            buffer = vertex_buffer({name: np.asarray(values, np.float32) for name, values in vertices.items()})
+            values = {"resolution": grid.resolution, "columns": atlas.columns, "size": atlas.size, "per_flux": PER_FLUX,
+                      "per_vector": PER_VECTOR}
+            gpu.state.program_point_size_set(True)
+            shader, _alive = bind(LPV_INJECT, uniforms={"parameters": values})
+            gpu.types.GPUBatch(type="POINTS", buf=buffer).draw(shader)
+            gpu.state.program_point_size_set(False)
+    return target.colors
+
+
+class FaceTextures:
+    """What the faces between the cells of a volume do to light: a ``Blocking`` as two textures of blocks."""
+
+    def __init__(self, resolution: tuple[int, int, int], blocking: Blocking):
+        self.atlas = atlas_of(resolution)
+        self.bounces = blocking.reflectance is not None
+        shape = tuple(resolution)[::-1]
+        self.faces = upload(self._blocks([rows.reshape(4, *shape) for rows in blocking.through]))
+        blockers = [np.zeros((4, *shape), np.float32)]
+        if self.bounces:
+            blockers = []
+            for axis in range(3):
+                for end in range(2):
+                    blocked, normal, albedo = (part[axis, end].reshape(-1, *shape)
+                                               for part in (blocking.blocked, blocking.normal, blocking.reflectance))
+                    blockers += [np.stack([*blocked, normal[0], normal[1]]), np.stack([*albedo, normal[2]])]
+        self.blockers = upload(self._blocks(blockers))
+
+    def _blocks(self, volumes: list[np.ndarray]) -> np.ndarray:
+        """Volumes (4, nz, ny, nx) as atlases side by side, four in a row."""
+        width, height = self.atlas.size
+        columns, rows = min(len(volumes), _BLOCK_COLUMNS), -(-len(volumes) // _BLOCK_COLUMNS)
+        texels = np.zeros((rows * height, columns * width, 4), np.float32)
+        for block, volume in enumerate(volumes):
+            x, y = block % _BLOCK_COLUMNS * width, block // _BLOCK_COLUMNS * height
+            texels[y:y + height, x:x + width] = self.atlas.pack(np.moveaxis(volume, 0, -1))
+        return texels
+
+
+def propagate_light(light: LightTextures, faces: FaceTextures, steps: int, progress: Progress | None = None) -> LightTextures:
+    """Accumulated fluxes as new textures: ``light`` (fluxes) and what each of ``steps`` steps makes of it, summed; ``light`` is
+    overwritten. Raises Cancelled when asked to stop."""
+    atlas = faces.atlas
+    current, following = light, tuple(empty(*atlas.size) for _ in _CHANNELS)
+    total = tuple(upload(download(texture)) for texture in light)
+    values = {"resolution": atlas.resolution, "columns": atlas.columns, "size": atlas.size, "side_ahead": SIDE_AHEAD,
+              "bounces": int(faces.bounces)}
+    for step in range(steps):
+        if progress is not None:
+            progress.step(step / steps, "propagating light")
+        samplers = {f"light_{name}": texture for name, texture in zip(_CHANNELS, current, strict=True)}
+        images = {f"{kind}_{name}": texture for kind, textures in (("next", following), ("total", total))
+                  for name, texture in zip(_CHANNELS, textures, strict=True)}
+        dispatch(LPV_PROPAGATE, atlas.size, uniforms={"parameters": values},
+                 samplers={**samplers, "faces": faces.faces, "blockers": faces.blockers}, images=images)
+        current, following = following, current
+    return total
+
+
+def upload_light(coefficients: np.ndarray, atlas: Atlas, scale: np.ndarray | float = 1.0) -> LightTextures:
+    """Textures of ``coefficients`` (4, 3, nz, ny, nx), each multiplied by ``scale`` (4,)."""
+    return tuple(upload(atlas.pack(np.moveaxis(coefficients[:, channel], 0, -1) * np.asarray(scale, np.float32)))
+                 for channel in range(3))
+
+
+def download_light(light: LightTextures, atlas: Atlas, scale: np.ndarray | float = 1.0) -> np.ndarray:
+    """The inverse of ``upload_light``: (4, 3, nz, ny, nx) float32."""
+    volumes = [np.moveaxis(atlas.unpack(download(texture)) * np.asarray(scale, np.float32), -1, 0) for texture in light]
+    return np.ascontiguousarray(np.stack(volumes, axis=1))
+
+
+def inject(grid: LpvGrid, positions: np.ndarray, normals: np.ndarray, flux: np.ndarray) -> np.ndarray:
+    """See techniques.lpv.injection.inject; sums are in float32."""
+    return download_light(inject_lights(grid, positions, normals, flux), atlas_of(grid.resolution))
+
+
+def propagate(coefficients: np.ndarray, blocking: Blocking, steps: int, *, threads: int | None = None,
+              progress: Progress | None = None) -> np.ndarray:
+    """See techniques.lpv.propagation.propagate; ``threads`` are the GPU's own."""
+    faces = FaceTextures(coefficients.shape[:1:-1], blocking)
+    light = upload_light(coefficients, faces.atlas, _UNIT)
+    return download_light(propagate_light(light, faces, steps, progress), faces.atlas, 1.0 / _UNIT)
