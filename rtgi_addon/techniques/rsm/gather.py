@@ -84,8 +84,8 @@ class GatherMap:
         return np.clip(0.5 + 0.5 * homogeneous[:, :2] / depth[:, None], 0.0, 1.0).astype(np.float32)
 
     def by_flux(self, xi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Texels (n, s), and places within them in the unit square (n, s, 2) float32, that follow the flux: ``xi`` (n, s, 2) chooses
-        a row by what it holds, then a texel of it, so that the points' evenness in two dimensions is kept."""
+        """Texels (n, s) that follow the flux, and places within them (n, s, 2) float32 in the unit square: ``xi`` (n, s, 2) chooses a
+        row by what it holds, then a texel of it, so that the points' evenness in two dimensions is kept."""
         size, last = self.view.resolution, self.cumulative[self.view.resolution - 1::self.view.resolution]
         target = xi[..., 1].astype(np.float64) * last[-1]
         row = np.searchsorted(last, target, side="right")
