@@ -68,3 +68,22 @@ LPV_PROPAGATE = Program(
         ("ivec3", "resolution"), ("int", "columns"), ("ivec2", "size"), ("float", "side_ahead"), ("int", "bounces")))),),
     samplers=(*(f"light_{name}" for name in _RGB), "faces", "blockers"), local_size=_GROUP,
     images=(*(Image(f"next_{name}") for name in _RGB), *(Image(f"total_{name}", access="READ_WRITE") for name in _RGB)))
+
+LPV_GATHER = Program(
+    "lpv_gather", uniforms=(("parameters", UniformStruct("LpvGatherParameters", (
+        ("ivec3", "resolution"), ("int", "columns"), ("int", "count"), ("int", "first_row"), ("float", "face_total"),
+        ("float", "face_ahead"), ("float", "inverse_area"), ("int", "dampening")))),),
+    samplers=("receivers", *(f"light_{name}" for name in _RGB)), local_size=_GROUP,
+    images=(Image("irradiance", access="READ_WRITE"),))
+
+RSM_GATHER = Program(
+    "rsm_gather", uniforms=(("parameters", UniformStruct("RsmGatherParameters", (
+        ("int", "size"), ("int", "count"), ("int", "first_row"), ("int", "in_disk"), ("int", "by_flux"),
+        ("float", "disk_radius")))),),
+    samplers=("receivers", "pattern", "texels", "cumulative"), local_size=_GROUP,
+    images=(Image("irradiance", access="READ_WRITE"),))
+
+VPL_GATHER = Program(
+    "vpl_gather", uniforms=(("parameters", UniformStruct("VplGatherParameters", (
+        ("int", "count"), ("int", "first_row"), ("int", "lights"), ("int", "has_visibility"), ("float", "clamp_at")))),),
+    samplers=("receivers", "lights", "visibility"), local_size=_GROUP, images=(Image("irradiance", access="READ_WRITE"),))

@@ -15,9 +15,7 @@ from ..transport.geometry import Geometry
 from .device import bind, uniform_buffer, vertex_buffer
 from .materials import Images, Slots, uniforms
 from .programs import MATERIAL, SURFACE_PASSES, VIEW, surface_program
-from .textures import FOLD_WIDTH, fold, upload
-
-_TEXELS_PER_INSTANCE = 6
+from .textures import fold, upload
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,8 +55,7 @@ class SurfacePass:
             override = tuple(sorted((instance.material_override or {}).items()))
             groups.setdefault((instance.mesh, override), []).append(index)
         ordered = [index for members in groups.values() for index in members]
-        width = FOLD_WIDTH // _TEXELS_PER_INSTANCE * _TEXELS_PER_INSTANCE
-        self._instances = upload(fold(_instance_rows(scene, geometry)[ordered].reshape(-1, 4), width))
+        self._instances = upload(fold(_instance_rows(scene, geometry)[ordered].reshape(len(ordered), -1)))
         self._draws, first = [], 0
         materials = scene.materials or (Material("default"),)
         for (mesh_index, override), members in groups.items():
@@ -97,7 +94,7 @@ def _instance_rows(scene: Scene, geometry: Geometry) -> np.ndarray:
     """(i, 6, 4) float32: what surface.vert.glsl reads of every instance."""
     counts = [len(scene.meshes[instance.mesh].triangles) for instance in scene.instances]
     starts = np.cumsum([0, *counts[:-1]])
-    rows = np.zeros((len(counts), _TEXELS_PER_INSTANCE, 4), np.float32)
+    rows = np.zeros((len(counts), 6, 4), np.float32)
     rows[:, :3] = [np.asarray(instance.world_from_local)[:3] for instance in scene.instances]
     # Scaled to a largest element of 1: the cofactors of a tiny instance underflow when they are squared.
     matrices = geometry.normal_matrices

@@ -44,17 +44,19 @@ def download(texture: gpu.types.GPUTexture) -> np.ndarray:
     return np.frombuffer(buffer, np.float32).reshape(shape).copy()
 
 
-def fold(rows: np.ndarray, width: int = FOLD_WIDTH) -> np.ndarray:
-    """A list (n, c ≤ 4) as texels (h, w, 4): item i stands at column i mod w, row i div w."""
+def fold(rows: np.ndarray) -> np.ndarray:
+    """A list (n, c) as texels (h, w, 4), for include/list.glsl: an item takes as many texels as c needs, one after the other, and
+    never goes over the end of a row."""
     n, channels = rows.shape
-    width = max(min(n, width), 1)
-    texels = np.zeros((max(-(-n // width), 1), width, 4), np.float32)
-    texels.reshape(-1, 4)[:n, :channels] = rows
-    return texels
+    parts = max(-(-channels // 4), 1)
+    per_row = max(min(n, FOLD_WIDTH // parts), 1)
+    items = np.zeros((max(-(-n // per_row), 1) * per_row, parts * 4), np.float32)
+    items[:n, :channels] = rows
+    return items.reshape(-1, per_row * parts, 4)
 
 
 def unfold(texels: np.ndarray, n: int, channels: int) -> np.ndarray:
-    """The first ``n`` items (n, channels) of what ``fold`` made."""
+    """The first ``n`` items (n, channels ≤ 4) of what ``fold`` made."""
     return np.ascontiguousarray(texels.reshape(-1, 4)[:n, :channels])
 
 
