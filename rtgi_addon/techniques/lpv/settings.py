@@ -13,18 +13,19 @@ class LpvSettings:
     """Settings of light propagation volumes; the metadata builds panel and command line."""
 
     order: int = setting(1, "SH Order", "Highest band of the exported probes; the volumes themselves hold order 1", "", 0, 2)
-    resolution: int = setting(32, "Resolution", "Cells along each side of every cascade", "", 4, 512)
+    resolution: int = setting(16, "Resolution", "Cells along each side of every cascade; light spreads with every cell it "
+                              "passes, so finer ones are not always more exact", "", 4, 512)
     cascades: int = setting(1, "Cascades", "Nested volumes of the same resolution, each with cells twice as large", "", 1, 8)
     cell_size: float | None = setting(None, "Cell Size", "Side of the finest cascade's cells; unset fits that cascade around the "
                                       "probe volumes and the room they stand in", "m", 1e-6, 1e6)
     center: str = setting("volumes", "Center", "What the cascades are centred on: 'volumes', 'camera' or the name of an object")
-    steps: int = setting(64, "Steps", "How often light moves on by one cell; games use 8, a room needs about twice its cells", "",
+    steps: int = setting(128, "Steps", "How often light moves on by one cell; games use 8, a room needs several times its cells", "",
                          1, 4096)
     bounces: bool = setting(True, "Further Bounces", "Reflect light that meets geometry while it is propagated")
     blocking: bool = setting(True, "Blocking", "Let geometry stop light between cells")
     occluders: str = setting("surfaces", "Occluders", "Geometry that blocks: all surfaces in the volume, or only what lamps and "
                              "cameras see of it", choices=("surfaces", "views"))
-    map_resolution: int = setting(256, "Shadow Map Size", "Texels along a side of each lamp's reflective shadow maps", "px",
+    map_resolution: int = setting(128, "Shadow Map Size", "Texels along a side of each lamp's reflective shadow maps", "px",
                                   16, 4096)
     dampening: bool = setting(True, "Self-light Damping", "Use the intensity's derivative along the normal to keep surfaces from "
                               "lighting themselves")
