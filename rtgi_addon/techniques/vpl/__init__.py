@@ -1,0 +1,72 @@
+"""Instant radiosity: all bounced light from a few thousand virtual point lights, each with its shadows.
+
+Papers: A. Keller, "Instant Radiosity", SIGGRAPH 1997; I. Georgiev and P. Slusallek, Eurographics 2010 (which lights to keep, see
+``sampling``); T. Kollig and A. Keller, MCQMC 2004 (clamp and compensation); S. Laine et al., EGSR 2007 (moving lamps, see
+``incremental``). Light paths leave lamps, emissive surfaces and the world in low-discrepancy order, shared out by power, and leave
+a virtual light of flux Φ wherever they are reflected: E = Σ Φ/π·cosθ·cosθ'/r²·V. Emissive surfaces are virtual lights themselves,
+the world is a set of distant ones.
+
+What it is not: smooth near surfaces. Without a clamp the estimate is unbiased but every virtual light is a bright spot within about
+the distance between lights; with one, corners are too dark unless compensated. Light from the world through small openings needs
+many distant lights. Glossy reflection is treated as diffuse of the same albedo.
+"""
+
+import numpy as np
+
+from ...errors import BakeError
+from ...progress import Progress
+from ...scene import Scene
+from ...transport.context import LightContext
+from ...transport.vectors import luminance
+from ..base import Checkpoint, Field, Technique, validate_settings
+from ..kernels import Kernels
+from ..probes.bake import focus
+from .field import VplField, require_lights
+from .gather import gather
+from .sampling import LightSet, sample_lights
+from .settings import VplSettings
+
+
+class VirtualPointLights(Technique):
+    """Bakes instant radiosity; see the module's docstring."""
+
+    name = "vpl"
+    label = "Virtual Point Lights"
+    description = "Instant radiosity: bounced light from virtual lights that can follow a moving lamp"
+    Settings = VplSettings
+    tolerance = 0.05
+    devices = ("cpu", "gpu")
+
+    def bake(self, scene: Scene, settings: VplSettings, rng: np.random.Generator, progress: Progress, *,
+             threads: int | None = None, checkpoint: Checkpoint | None = None, kernels: Kernels | None = None) -> Field:
+        """See Technique.bake. ``kernels`` take over the gather at surface points. Raises BakeError if no virtual light survives."""
+        validate_settings(settings)
+        if not scene.volumes:
+            raise BakeError("the scene has no probe volume", "add a Light Probe Volume")
+        seed = int(rng.integers(1 << 32))
+        progress.stage("ray tracer")
+        progress.step(0.0, "building the ray tracer")
+        context = LightContext(scene, threads)
+        progress.stage("virtual lights")
+        lights = sample_lights(context, scene.volumes, settings, seed, focus(scene.volumes), progress.span(0.02, 0.2))
+        field = VplField(context, lights, settings, seed, kernels=kernels)
+        field.stats = {"lights": field.lights.count, "distant_lights": field.lights.distant_count, "paths": lights.paths.count}
+        require_lights(field)
+        if settings.clamp is not None:
+            field.stats["clamp_loss"] = clamp_loss(context, field, lights, settings.clamp)
+        progress.stage("probes")
+        probes = sum(int(np.prod(volume.resolution)) for volume in scene.volumes)
+        field.grids(progress.span(0.2, 1.0))
+        field.stats["rays"] = probes * (field.lights.count + field.lights.distant_count)
+        return field
+
+
+def clamp_loss(context: LightContext, field: VplField, lights: LightSet, clamp: float) -> float:
+    """Share of the irradiance of surfaces seen from the volumes that the bound ``clamp`` [m⁻²] takes away, before compensation."""
+    points, normals = lights.pilots.surface, lights.pilots.normals
+    whole, cut = (luminance(gather(context, field.lights, points, normals, clamp=bound)).sum(dtype=np.float64)
+                  for bound in (None, clamp))
+    return float(1.0 - cut / whole) if whole > 0 else 0.0
+
+
+TECHNIQUE = VirtualPointLights()

@@ -1,0 +1,118 @@
+"""What a bound on the geometry term takes away, found again by short rays.
+
+Source: T. Kollig and A. Keller, "Illumination in the Presence of Weak Singularities", MCQMC 2004: the part max(0, G − b) of the
+light between two surfaces is cut from every virtual light, so it is sampled from the receiver instead, where its 1/r² cancels. It
+differs from 0 only where r² < cosθ/b, so the rays are short and few of them hit anything.
+
+The radiance found at their ends is emission plus what lamps and a subset of the (bounded) virtual lights send there: the loss of
+that light itself is not compensated again, so of a loss of p some p² remains.
+"""
+
+import numpy as np
+
+from ...numerics import sh
+from ...numerics.sampling import cosine_hemisphere, frame, hash_u32, sobol_owen_at, sphere_from_square
+from ...transport.context import LightContext
+from ...transport.direct import lamp_irradiance
+from ...transport.parallel import CHUNK, chunks, parallel_for
+from ...transport.rays import offset_origins
+from ...transport.vectors import dot, normalized
+from ...transport.virtual_lights import VirtualLights
+from .gather import gather
+
+# Virtual lights asked about the light at a ray's end, and how many different subsets of them there are.
+SUBSET, SUBSETS = 128, 8
+
+
+class Compensation:
+    """Compensates a bound ``clamp`` [m⁻²] with ``rays`` short rays per receiver; ``bounces`` as in the bake."""
+
+    def __init__(self, context: LightContext, lights: VirtualLights, clamp: float, rays: int, bounces: int | None, seed: int):
+        self._context, self._clamp, self._rays, self._bounces, self._seed = context, np.float32(clamp), rays, bounces, seed
+        # Light that arrives at a ray's end is reflected once more there.
+        again = lights if bounces is None else lights.take(np.flatnonzero(lights.bounce < bounces))
+        stride = max(1, again.count // SUBSET)
+        self._subsets = []
+        for offset in range(min(stride, SUBSETS)):
+            part = again.take(slice(offset * stride // min(stride, SUBSETS), None, stride))
+            gain = np.float32(again.count / max(part.count, 1))
+            self._subsets.append(VirtualLights(part.positions, part.normals, part.flux * gain, part.source, part.bounce, part.path,
+                                               part.directions, part.irradiance))
+
+    def irradiance(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """What ``gather`` with this clamp lacks: (n, 3) float32."""
+        normals = np.ascontiguousarray(normals, np.float32)
+        origins = offset_origins(np.ascontiguousarray(points, np.float32), normals, normals)
+
+        def directions(rows, u):
+            local = cosine_hemisphere(u)
+            tangent, bitangent = frame(normals[rows])
+            along = normalized(tangent * local[:, :1] + bitangent * local[:, 1:2] + normals[rows] * local[:, 2:])
+            return along, np.maximum(local[:, 2], 0)
+
+        def total(found, _along, values, count):
+            sums = np.stack([np.bincount(found, values[:, c], count) for c in range(3)], axis=1)
+            return sums * (np.pi / self._rays)
+
+        return self._sampled(origins, directions, total, (3,))
+
+    def coefficients(self, points: np.ndarray, order: int) -> np.ndarray:
+        """What ``gather_sh`` with this clamp lacks: (n, (order + 1)², 3) float32."""
+        def directions(rows, u):
+            return sphere_from_square(u), np.ones(len(u), np.float32)
+
+        def total(found, along, values, count):
+            products = sh.evaluate(along, order)[:, :, None] * values[:, None]
+            result = np.zeros((count, *products.shape[1:]))
+            np.add.at(result, found, products)
+            return result * (4.0 * np.pi / self._rays)
+
+        return self._sampled(np.ascontiguousarray(points, np.float32), directions, total, (sh.coefficient_count(order), 3))
+
+    def _sampled(self, origins, directions, total, shape) -> np.ndarray:
+        """Sums of the residual radiance over each receiver's rays, in chunks over the threads."""
+        spans = chunks(len(origins), max(1, CHUNK // self._rays))
+        result = np.zeros((len(origins), *shape), np.float32)
+
+        def work(i):
+            span = spans[i]
+            count = span.stop - span.start
+            rows = np.repeat(np.arange(span.start, span.stop), self._rays)
+            index = np.tile(np.arange(self._rays), count)
+            along, cosine = directions(rows, sobol_owen_at(index, 2, hash_u32(self._seed, rows)))
+            hits = self._context.tracer.intersect(origins[rows], along, np.sqrt(cosine / self._clamp))
+            found = np.flatnonzero(hits.primitive >= 0)
+            if found.size == 0:
+                return
+            primitive = hits.primitive[found]
+            facing = np.abs(dot(self._context.geometry.normals_world[primitive], along[found]))
+            geometry_term = cosine[found] * facing / np.maximum(hits.t[found] ** 2, np.float32(1e-30))
+            residual = 1.0 - self._clamp / np.maximum(geometry_term, np.float32(1e-30))
+            cut = np.flatnonzero(residual > 0)
+            found, residual = found[cut], residual[cut]
+            radiance = self._radiance(primitive[cut], hits.u[found], hits.v[found], hits.t[found], along[found], rows[found])
+            result[span] = total(rows[found] - span.start, along[found], radiance * residual[:, None], count)
+
+        parallel_for(work, len(spans), self._context.threads)
+        return result
+
+    def _radiance(self, primitive, u, v, t, along, rows) -> np.ndarray:
+        """Radiance (h, 3) that leaves the hits against the rays."""
+        context = self._context
+        surfaces, normals = context.surfaces, context.geometry.normals_world[primitive]
+        radiance = surfaces.emission(primitive, u, v) if surfaces.has_emission else np.zeros((len(primitive), 3), np.float32)
+        if self._bounces == 0 or len(primitive) == 0:
+            return radiance
+        side = -np.copysign(np.float32(1.0), dot(normals, along))[:, None]
+        geometric, shading = normals * side, surfaces.shading_normal(primitive, u, v) * side
+        points = offset_origins(context.geometry.points(primitive, u, v), geometric, geometric, t)
+        irradiance = np.zeros((len(points), 3), np.float32)
+        if context.lamps.count:
+            numbers = np.stack([hash_u32(self._seed, rows, np.arange(len(rows)), d) for d in range(3)], axis=1)
+            irradiance += lamp_irradiance(context, points, geometric, shading,
+                                          (numbers >> np.uint32(8)).astype(np.float32) * np.float32(2.0**-24))
+        for number, lights in enumerate(self._subsets):
+            chosen = np.flatnonzero(rows % len(self._subsets) == number)
+            if chosen.size:
+                irradiance[chosen] += gather(context, lights, points[chosen], shading[chosen], clamp=float(self._clamp), threads=1)
+        return radiance + surfaces.albedo(primitive, u, v) * irradiance * np.float32(1.0 / np.pi)

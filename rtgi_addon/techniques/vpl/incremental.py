@@ -1,0 +1,174 @@
+"""Virtual lights that follow a moving lamp: those it still lights stay, the others are replaced where the distribution has holes.
+
+Source: S. Laine, H. Saransaari, J. Kontkanen, J. Lehtinen and T. Aila, "Incremental Instant Radiosity for Real-Time Indirect
+Illumination", EGSR 2007. A path is valid while its lamp shines at the first surface that it met and sees it. In the lamp's own
+domain (directions, or places across a sun's beam) every path stands for the cell of what lies nearer to it than to any other, and
+has the lamp's power over that cell, so the light stays right however uneven the paths become. Paths that crowd each other are given
+up, and new ones begin in the largest holes.
+
+Beyond the paper: any lamp type; later bounces hang on their path and follow its power; the cells' power is counted from rays that
+the lamp would emit now, SAMPLES for each path, instead of from a triangulation.
+"""
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from ...numerics.sampling import hash_u32, sobol_owen_at
+from ...scene import AreaLight, Light
+from ...transport.context import LightContext
+from ...transport.light_emission import Emission, connect, emit, near_gain
+from ...transport.light_paths import FROM_WORLD, LightPaths, join, shading_gain, trace
+from ...transport.parallel import chunks
+from ...transport.path_numbers import PathNumbers
+from ...transport.vectors import dot, luminance
+from .sampling import LightSet, added_paths, distant_lights, path_count, paths_per_source, source_paths
+
+# Rays a path that a lamp's power is counted with.
+SAMPLES = 16
+# A path with less than this share of the mean power crowds its neighbours; so many of a lamp's are given up at once.
+CROWDED, GIVEN_UP = 0.2, 0.02
+# With fewer valid paths than this share the lamp has jumped: it is sampled afresh.
+FRESH_BELOW = 0.5
+
+
+@dataclass(frozen=True)
+class Change:
+    """What an update did: ``paths`` that met a surface, and how many of them are new."""
+
+    paths: int
+    replaced: int
+
+    @property
+    def fraction(self) -> float:
+        """Share of the paths that were replaced."""
+        return self.replaced / max(self.paths, 1)
+
+
+def follow(lights: LightSet, before: LightContext, after: LightContext, settings, seed: int) -> tuple[LightSet, Change]:
+    """``lights`` of the scene ``before`` under the lamps and world of ``after``."""
+    paths, generation = lights.paths, lights.generation + 1
+    seed = int(hash_u32(seed, generation))
+    old, new = before.scene.lights, after.scene.lights
+    same_world = after.environment is before.environment
+    kept = np.ones(paths.count, bool)
+    power = paths.power.copy()
+    added: list[LightPaths] = []
+    fresh = dict(paths_per_source(after, lights.beam, lights.radius, path_count(settings)))
+    for lamp in range(max(len(old), len(new))):
+        rows = np.flatnonzero(paths.source == lamp)
+        if lamp < min(len(old), len(new)) and _same(old[lamp], new[lamp]):
+            continue
+        moved = None
+        if lamp < min(len(old), len(new)) and rows.size and _can_follow(old[lamp], new[lamp]):
+            moved = _follow_lamp(lights, rows, after, lamp, settings.bounces, seed)
+        if moved is None:
+            kept[rows] = False
+            if lamp in fresh:
+                added.append(source_paths(after, lamp, rows.size or fresh[lamp], lights.beam, settings.bounces, seed))
+            continue
+        stay, power_of_rows, new_paths = moved
+        kept[rows[~stay]] = False
+        power[rows] = power_of_rows
+        added.append(new_paths)
+    if not same_world:
+        rows = np.flatnonzero(paths.source == FROM_WORLD)
+        kept[rows] = False
+        if FROM_WORLD in fresh:
+            added.append(source_paths(after, FROM_WORLD, fresh[FROM_WORLD], lights.beam, settings.bounces, seed))
+    if same_world and not added:
+        return replace(lights, generation=generation), Change(int(paths.met.sum()), 0)
+    old_paths = replace(paths, power=power).take_paths(np.flatnonzero(kept))
+    parts = [old_paths, *(added_paths(after, lights, part, seed) for part in added)]
+    result = replace(lights, paths=join(parts), generation=generation)
+    if not same_world:
+        directions, irradiance = distant_lights(after, lights.pilots, settings.lights, seed)
+        result = replace(result, directions=directions, irradiance=irradiance)
+    return result, Change(int(result.paths.met.sum()), int(sum(part.met.sum() for part in added)))
+
+
+def _follow_lamp(lights: LightSet, rows: np.ndarray, context: LightContext, lamp: int, bounces: int | None, seed: int):
+    """For one lamp's paths ``rows`` (n,): which stay (n,) bool, the power (n, 3) of all of them, and those that take the places
+    of the others. None if too few stay."""
+    paths, light, beam = lights.paths, context.scene.lights[lamp], lights.beam
+    first, normals, met = paths.first[rows], paths.first_normal[rows], paths.met[rows]
+    origins, directions, domain, valid = connect(light, first, paths.u[rows], beam)
+    valid = valid & (~met | (dot(normals, directions) < 0))
+    candidates = np.flatnonzero(valid)
+    blocked = context.tracer.occluded(origins[candidates], first[candidates] - origins[candidates], np.float32(1.0))
+    valid[candidates[blocked]] = False
+    if valid.sum() < FRESH_BELOW * len(rows):
+        return None
+    # Rays that the lamp would emit now tell each path's share of its power.
+    index = np.arange(SAMPLES * len(rows))
+    key = hash_u32(seed, lamp, 0x696E)
+    u = sobol_owen_at(index, 4, key)
+    emission = emit(light, u, beam)
+    cells = _Cells(emission.domain, domain[valid])
+    brightness = luminance(emission.power)
+    mass = np.bincount(cells.owner, brightness, len(cells.points))
+    crowded = np.argsort(mass, kind="stable")[:int(GIVEN_UP * len(rows))]
+    crowded = crowded[mass[crowded] < CROWDED * brightness.sum() / len(rows)]
+    stay = valid.copy()
+    stay[np.flatnonzero(valid)[crowded]] = False
+    cells = _Cells(emission.domain, domain[stay], cells, np.delete(np.arange(len(cells.points)), crowded))
+    taken = cells.fill(len(rows) - int(stay.sum()))
+    part = Emission(*(array[taken] for array in emission))
+    numbers = PathNumbers(np.full(len(taken), key), index[taken].astype(np.uint32))
+    new = trace(context, light, lamp, part, u[taken, 2:], numbers, bounces)
+    power = np.stack([np.bincount(cells.owner, emission.power[:, c], len(cells.points)) for c in range(3)], axis=1) / len(index)
+    kept_gain = shading_gain(paths.first_shading[rows[stay]], normals[stay], directions[stay]) * near_gain(light, first[stay])
+    power_of_rows = np.zeros((len(rows), 3), np.float32)
+    count = int(stay.sum())
+    power_of_rows[stay] = power[:count] * np.where(met[stay], kept_gain, 1.0)[:, None]
+    new_gain = shading_gain(new.first_shading, new.first_normal, part.directions) * near_gain(light, new.first)
+    new = replace(new, power=(power[count:] * np.where(new.met, new_gain, 1.0)[:, None]).astype(np.float32))
+    return stay, power_of_rows, new
+
+
+class _Cells:
+    """The nearest of ``points`` (n, 3) to each of ``samples`` (k, 3): its ``owner`` (k,) and squared distance."""
+
+    def __init__(self, samples: np.ndarray, points: np.ndarray, known: "_Cells | None" = None, kept: np.ndarray | None = None):
+        self.samples, self.points = samples, points
+        if known is None:
+            self.owner, self._squared = np.zeros(len(samples), np.int64), np.zeros(len(samples), np.float32)
+            rows = np.arange(len(samples))
+        else:
+            # Only the samples of points that are gone have to look for another.
+            number = np.full(len(known.points), -1, np.int64)
+            number[kept] = np.arange(len(kept))
+            self.owner, self._squared = number[known.owner], known._squared.copy()
+            rows = np.flatnonzero(self.owner < 0)
+        norms = (points**2).sum(axis=1)
+        for span in chunks(len(rows), max(1, (1 << 22) // max(len(points), 1))):
+            part = samples[rows[span]]
+            squared = norms - 2.0 * (part @ points.T)
+            nearest = squared.argmin(axis=1)
+            self.owner[rows[span]] = nearest
+            self._squared[rows[span]] = ((part - points[nearest]) ** 2).sum(axis=1)
+
+    def fill(self, count: int) -> np.ndarray:
+        """Make ``count`` samples points, one after the other that which lies farthest from all; their indices (count,)."""
+        taken = np.empty(count, np.int64)
+        for i in range(count):
+            taken[i] = self._squared.argmax()
+            squared = ((self.samples - self.samples[taken[i]]) ** 2).sum(axis=1)
+            nearer = squared < self._squared
+            self.owner[nearer], self._squared[nearer] = len(self.points) + i, squared[nearer]
+        self.points = np.concatenate([self.points, self.samples[taken]])
+        return taken
+
+
+def _can_follow(old: Light, new: Light) -> bool:
+    """Whether a path of ``old`` can be one of ``new``: the same kind, with shadows, and rays that spread."""
+    if type(old) is not type(new) or not (old.casts_shadow and new.casts_shadow):
+        return False
+    return not isinstance(new, AreaLight) or (new.spread > 0 and old.shape == new.shape)
+
+
+def _same(old: Light, new: Light) -> bool:
+    return type(old) is type(new) and all(np.array_equal(getattr(old, item.name), getattr(new, item.name)) for item in fields(old)
+                                          if item.name != "name")
+
+
