@@ -95,8 +95,8 @@ def views_of(context, lamp: int, resolution: int = 512, *, focus: np.ndarray | N
     """The views of lamp ``lamp`` of ``context``; none where it gives no light.
 
     A sun is fitted to the box ``focus`` (2, 3) (None: the whole scene) and moves in whole texels; a point lamp gets the faces of a
-    cube; a spot a frustum around its cone, or cube faces if that is wide; an area lamp ``area_points`` stratified points with a
-    hemicube each, or a frustum if its beam is narrow.
+    cube, or a frustum around the scene if it is far outside; a spot a frustum around its cone, or cube faces if that is wide; an
+    area lamp ``area_points`` stratified points with a hemicube each, or a frustum if its beam is narrow.
     """
     light = context.scene.lights[lamp]
     bounds = np.array(context.geometry.bounds(), np.float64)
@@ -105,7 +105,7 @@ def views_of(context, lamp: int, resolution: int = 512, *, focus: np.ndarray | N
     if isinstance(light, SunLight):
         placed = [_sun_view(light, bounds, bounds if focus is None else np.asarray(focus, np.float64), resolution)]
     elif isinstance(light, PointLight):
-        placed = _cube_views(light.position_world, bounds)
+        placed = _point_views(light.position_world, bounds)
     elif isinstance(light, SpotLight):
         placed = _spot_views(light, bounds)
     else:
@@ -155,16 +155,23 @@ def _sun_view(light: SunLight, bounds: np.ndarray, focus: np.ndarray, resolution
     return _pose(rotation, rotation @ centre), _orthographic(half, half, margin, far), True, margin, far
 
 
-def _cube_views(position, bounds: np.ndarray, axes=range(6)):
-    near, far = _depths(position, bounds)
-    for axis in axes:
-        yield _pose(_look_along(CUBE_AXES[axis], _CUBE_UPS[axis]), position), _frustum(-1, 1, -1, 1, near, far), False, near, far
+def _point_views(position, bounds: np.ndarray):
+    """One frustum around the scene's bounding sphere where that takes less than a cube's face, else a cube."""
+    towards = bounds.mean(axis=0) - np.asarray(position, np.float64)
+    distance, radius = np.linalg.norm(towards), 0.5 * np.linalg.norm(bounds[1] - bounds[0])
+    if distance > 1.5 * radius:
+        # The sphere's silhouette; a thousandth more keeps its rim off the map's edge.
+        return [_pinhole(_look_along(towards), position, bounds, 1.001 * radius / np.sqrt(distance**2 - radius**2))]
+    return _cube_views(position, bounds)
+
+
+def _cube_views(position, bounds: np.ndarray):
+    return [_pinhole(_look_along(axis, up), position, bounds) for axis, up in zip(CUBE_AXES, _CUBE_UPS, strict=True)]
 
 
 def _spot_views(light: SpotLight, bounds: np.ndarray):
     rotation = _look_along(light.direction_world)
-    local = np.eye(3) if light.world_from_local is None else np.asarray(light.world_from_local, np.float64)
-    axes = rotation if light.world_from_local is None else local
+    axes = rotation if light.world_from_local is None else np.asarray(light.world_from_local, np.float64)
     half = 0.5 * min(light.cone_angle, np.pi)
     if half < 0.5 * np.pi - 1e-3:
         angle = np.linspace(0.0, 2.0 * np.pi, 256, endpoint=False)
@@ -174,10 +181,8 @@ def _spot_views(light: SpotLight, bounds: np.ndarray):
             # The rim is sampled: a thousandth more than its extremes covers the arcs between.
             tangent = 1.001 * float(np.max(np.abs(np.stack([x, y]) / z)))
             if tangent <= MAX_TANGENT:
-                near, far = _depths(light.position_world, bounds)
-                pose = _pose(rotation, light.position_world)
-                return [(pose, _frustum(-tangent, tangent, -tangent, tangent, near, far), False, near, far)]
-    return list(_cube_views(light.position_world, bounds))
+                return [_pinhole(rotation, light.position_world, bounds, tangent)]
+    return _cube_views(light.position_world, bounds)
 
 
 def _area_views(light: AreaLight, bounds: np.ndarray, points: int):
@@ -190,18 +195,15 @@ def _area_views(light: AreaLight, bounds: np.ndarray, points: int):
     if tangent == 0:
         corners = np.stack([half_u, half_v]) @ front
         width, height = np.abs(corners[:, :2]).sum(axis=0)
-        near, far = _depths(centre, bounds)
+        near, far = _depths(front, centre, bounds)
         return [(_pose(front, centre), _orthographic(width, height, near, far), True, near, far)]
     views = []
     for s, t in _shape_points(light.shape, points):
         position = centre + s * half_u + t * half_v
-        near, far = _depths(position, bounds)
-        reach = min(tangent, 1.0)
-        views.append((_pose(front, position), _frustum(-reach, reach, -reach, reach, near, far), False, near, far, 1.0 / points))
+        views.append((*_pinhole(front, position, bounds, min(tangent, 1.0)), 1.0 / points))
         if tangent > 1:
             for side in (front[:, 0], -front[:, 0], front[:, 1], -front[:, 1]):
-                pose = _pose(_look_along(side, normal), position)
-                views.append((pose, _frustum(-1, 1, 0, 1, near, far), False, near, far, 1.0 / points))
+                views.append((*_pinhole(_look_along(side, normal), position, bounds, bottom=0.0), 1.0 / points))
     return views
 
 
@@ -251,11 +253,21 @@ def _pose(rotation: np.ndarray, position) -> np.ndarray:
     return pose
 
 
-def _depths(position, bounds: np.ndarray) -> tuple[float, float]:
-    """Near and far distance [m] of a pinhole that sees all of ``bounds``, wherever it looks."""
-    farthest = np.linalg.norm(_corners(bounds) - np.asarray(position, np.float64), axis=1).max()
-    far = 1.001 * max(float(farthest), 1e-6)
-    return NEAR_SHARE * far, far
+def _pinhole(rotation: np.ndarray, position, bounds: np.ndarray, tangent: float = 1.0, bottom: float | None = None):
+    """Pose, projection, whether it is parallel (no), near and far of a view that reaches ``tangent`` to all sides, or to ``bottom``
+    below."""
+    near, far = _depths(rotation, position, bounds)
+    frustum = _frustum(-tangent, tangent, -tangent if bottom is None else bottom, tangent, near, far)
+    return _pose(rotation, position), frustum, False, near, far
+
+
+def _depths(rotation: np.ndarray, position, bounds: np.ndarray) -> tuple[float, float]:
+    """Near and far [m] between which all of ``bounds`` lies that is in front: close to it, since rays start at the near plane."""
+    offset = _corners(bounds) - np.asarray(position, np.float64)
+    reach = 1.001 * max(float(np.linalg.norm(offset, axis=1).max()), 1e-6)
+    depth = -(offset @ rotation[:, 2])
+    near = max(NEAR_SHARE * reach, 0.999 * float(depth.min()))
+    return near, max(1.001 * float(depth.max()), 2.0 * NEAR_SHARE * reach)
 
 
 def _corners(bounds: np.ndarray) -> np.ndarray:

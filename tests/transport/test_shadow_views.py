@@ -8,6 +8,7 @@ from rtgi_addon.numerics.sampling import fibonacci_sphere
 from rtgi_addon.scene import AreaLight, PointLight, SpotLight, SunLight
 from rtgi_addon.transport.context import LightContext
 from rtgi_addon.transport.lamps import spot_attenuation
+from rtgi_addon.transport.reflective_shadow_map import capture
 from rtgi_addon.transport.shadow_views import texel_power, views_of
 
 INTENSITY = np.array([1.0, 2.0, 3.0])
@@ -111,6 +112,20 @@ def test_views_of_an_area_lamp_stand_on_it_and_share_it():
     assert middle == (0.0, 0.0, 0.0)
 
 
+@pytest.mark.parametrize("distance", [8.0, 300.0, 1e6])
+def test_a_point_lamp_far_outside_takes_one_view_around_the_scene(distance):
+    """It holds all that falls on the room's outside: each face's solid angle."""
+    light = PointLight("lamp", np.array([0.0, 0.0, distance]), INTENSITY)
+    context = context_with(light, 2.0)
+    view, = views_of(context, 0, 256)
+    item = capture(context, view)
+    edge = 2.0 / (distance - 2.0)
+    seen = 4 * np.arctan2(edge * edge, np.sqrt(2 * edge * edge + 1)) * INTENSITY
+    assert item.total_flux == pytest.approx(0.5 * seen, rel=0.02)
+    assert np.abs(item.position[item.primitive >= 0][:, 2] - 2.0).max() < 1e-5
+    assert len(views_of(context_with(PointLight("lamp", np.array([0.0, 0.0, 3.0]), INTENSITY)), 0, 8)) == 6
+
+
 def test_rays_run_from_the_near_plane_to_the_far_plane_along_the_light():
     for light in (spot(), sun(), area(), PointLight("lamp", np.zeros(3), INTENSITY)):
         for view in views_of(context_with(light), 0, 5):
@@ -118,7 +133,7 @@ def test_rays_run_from_the_near_plane_to_the_far_plane_along_the_light():
             unit = directions / np.linalg.norm(directions, axis=1, keepdims=True)
             assert unit == pytest.approx(view.directions(), abs=2e-6)
             depth = -((origins - view.position_world) @ view.world_from_view[:3, 2])
-            assert depth == pytest.approx(view.near, rel=1e-2)
+            assert depth == pytest.approx(view.near, rel=1e-2, abs=1e-6)
             assert directions @ -view.world_from_view[:3, 2] == pytest.approx(view.far - view.near, rel=1e-5)
             uv, front = view.project(origins + 0.4 * directions)
             assert front.all()
