@@ -12,6 +12,7 @@ from ..exchange.bundle import check_target, write_bundle
 from ..progress import Progress
 from ..scene import ProbeVolume, Scene
 from ..scene.checks import check_scene, require
+from ..techniques.kernels import Kernels
 from ..transport.rays import slow_rays_warning
 from .checkpoint import FileCheckpoint
 from .fingerprint import fingerprint
@@ -26,14 +27,16 @@ PICTURE_FROM = 0.8
 def bake_scene(scene: Scene, technique: str = "probes", overrides: dict | None = None, out="bake", *,
                base: dict | None = None, seed: int = 0, threads: int | None = None, progress: Progress | None = None,
                resume: bool = False, volume=None, checkpoint_seconds: float = 10.0, device: str = "cpu",
-               picture=None) -> BakeSummary:
+               kernels: Kernels | None = None, picture=None) -> BakeSummary:
     """Bake the volumes of ``scene`` with the technique called ``technique`` into the bundle ``out``.
 
     ``overrides`` maps names of the technique's settings to values and wins over what a volume itself carries, which wins over
     ``base`` (the scene's own settings, as a panel holds them), which wins over the technique's defaults. ``volume`` is
     None (all of them), a name or several. The same scene, settings and seed give the same bytes for any ``threads``
     (None = every core), interrupted and continued with ``resume`` or not. A checkpoint is left in `OUT.partial` at most every
-    ``checkpoint_seconds`` and removed once the bundle is written. ``picture`` is a PNG to draw the probes into after that.
+    ``checkpoint_seconds`` and removed once the bundle is written. With the ``device`` 'gpu' the technique's inner loops run as
+    ``kernels`` (None: on Blender's GPU, from this thread, which must then be the main one). ``picture`` is a PNG to draw the
+    probes into after that.
 
     Raises BakeError for what the user can mend and Cancelled once ``progress.cancel`` was called: the bundle that was at
     ``out`` before is then as it was. Any other exception of the technique goes through unchanged, with the same promise.
@@ -42,7 +45,8 @@ def bake_scene(scene: Scene, technique: str = "probes", overrides: dict | None =
     overrides = overrides or {}
     method = techniques.get(technique)
     settings = build_settings(method, {**(base or {}), **overrides})
-    _require_device(method, device)
+    require_device(method, device)
+    placed = {"kernels": kernels or _gpu_kernels()} if device == "gpu" else {}
     target = check_target(out)
     written = 1.0 if picture is None else PICTURE_FROM
 
@@ -58,7 +62,7 @@ def bake_scene(scene: Scene, technique: str = "probes", overrides: dict | None =
     try:
         progress.stage("bake")
         field = method.bake(scene, settings, np.random.default_rng(seed), progress.span(0.02, written - 0.02), threads=threads,
-                            checkpoint=checkpoint)
+                            checkpoint=checkpoint, **placed)
         progress.stage("write")
         progress.step(written - 0.02, f"Writing {target.name}")
         write_bundle(target, field, scene, settings=asdict(settings), seed=seed, notes=[*scene.notes, *field.notes, *warnings],
@@ -78,11 +82,19 @@ def bake_scene(scene: Scene, technique: str = "probes", overrides: dict | None =
     return summary
 
 
-def _require_device(method: techniques.Technique, device: str) -> None:
-    devices = getattr(method, "devices", ("cpu",))
-    if device not in devices:
+def require_device(method: techniques.Technique, device: str) -> None:
+    """Raise BakeError if the technique does not bake on ``device``."""
+    if device not in method.devices:
         raise BakeError(f"technique {method.name!r} does not bake on the device {device!r}",
-                        f"use --device {' or '.join(devices)}")
+                        f"use --device {' or '.join(method.devices)}")
+
+
+def _gpu_kernels() -> Kernels:
+    from ..preview import context
+    context.require()
+    # Importable inside Blender alone.
+    from ..preview.kernels import GpuKernels
+    return GpuKernels()
 
 
 def _select(volumes: tuple[ProbeVolume, ...], wanted, overrides: dict) -> tuple[ProbeVolume, ...]:

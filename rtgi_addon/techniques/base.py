@@ -134,7 +134,8 @@ class Technique(ABC):
     """One GI technique: a name, a frozen ``Settings`` dataclass, and ``bake``.
 
     ``tolerance`` is the relative error of irradiance that it declares for scenes with a closed form, at default settings;
-    ``knows`` names the light in its fields, of KNOWN_LIGHT; without "bounces" they hold the first bounce of it.
+    ``knows`` names the light in its fields, of KNOWN_LIGHT; without "bounces" they hold the first bounce of it. ``devices`` says
+    where it can bake; one that knows "gpu" takes ``kernels`` in its ``bake`` (techniques/kernels.py).
     """
 
     name: ClassVar[str]
@@ -143,6 +144,7 @@ class Technique(ABC):
     Settings: ClassVar[type]
     tolerance: ClassVar[float] = 0.02
     knows: ClassVar[frozenset[str]] = KNOWN_LIGHT
+    devices: ClassVar[tuple[str, ...]] = ("cpu",)
 
     @abstractmethod
     def bake(self, scene: Scene, settings, rng: np.random.Generator, progress: Progress, *, threads: int | None = None,

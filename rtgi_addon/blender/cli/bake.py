@@ -4,7 +4,7 @@ import argparse
 
 from ... import techniques
 from ...exchange.bundle import check_target
-from ...jobs.bake import bake_scene
+from ...jobs.bake import bake_scene, require_device
 from ...jobs.report import BakeSummary
 from ...jobs.settings import build_settings
 from .base import EXTRACT_SHARE, Session, Subcommand
@@ -28,7 +28,8 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--resume", action="store_true", help="continue an interrupted bake to the same --out")
     parser.add_argument("--checkpoint-seconds", type=_seconds, default=10.0, metavar="T",
                         help="how often an unfinished bake is saved (default 10)")
-    parser.add_argument("--device", choices=("cpu", "gpu"), default="cpu")
+    parser.add_argument("--device", choices=("cpu", "gpu"), default="cpu",
+                        help="where the inner loops of a technique run that knows both (default cpu)")
     parser.add_argument("--picture", metavar="FILE.png", help="then draw the probes as spheres in the scene they light")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", dest="assignments", type=_assignment,
                         help="any other setting of the technique; may be repeated")
@@ -48,8 +49,11 @@ def _check(arguments: argparse.Namespace) -> None:
 
 def _run(arguments: argparse.Namespace, session: Session) -> BakeSummary:
     # Everything that can fail without the file fails before it is read.
-    techniques.get(arguments.technique)
+    require_device(techniques.get(arguments.technique), arguments.device)
     check_target(arguments.out)
+    if arguments.device == "gpu":
+        from ..gpu_context import open_context
+        open_context()
     session.progress.stage("extract")
     scene = session.read_scene()
     return bake_scene(

@@ -28,6 +28,7 @@ class ReflectiveShadowMaps(Technique):
     label = "Reflective Shadow Maps"
     description = "One bounce of the lamps, gathered from what each of them lights first; without occlusion, as in the paper"
     Settings = RsmSettings
+    devices = ("cpu", "gpu")
     tolerance = 0.05
     knows = frozenset({"lamps"})
 
