@@ -16,9 +16,13 @@ import numpy as np
 from ..errors import BakeError
 from ..scene import ProbeVolume, Scene
 from ..techniques import Field, ProbeGrid
+from ..techniques.lpv.field import LpvField
 from . import flipbook
 from .exr import read_exr, write_exr
 from .files import disk_error, recover_swap, remove_folder, sibling, swap_folder, sync_file, sync_folder, write_atomically
+from .lpv_volume import FOLDER as LPV_FOLDER
+from .lpv_volume import INDEX as LPV_INDEX
+from .lpv_volume import write_lpv_volume
 from .names import folder_names
 from .plain import plain
 from .schema import MANIFEST, RESTORE, RTGI_VERSION, SAMPLE_PLACEMENT, SCHEMA, SH_CONVENTION, files_of, read_manifest
@@ -95,9 +99,14 @@ def write_bundle(out, field: Field, scene: Scene, *, settings: dict, seed: int, 
 
 def _write_files(folder: Path, field: Field, scene: Scene, settings: dict, seed: int, stats, notes) -> None:
     grids = field.grids()
-    folders = folder_names([grid.volume.name for grid in grids], reserved=[MANIFEST])
+    reserved = [MANIFEST, LPV_FOLDER] if isinstance(field, LpvField) else [MANIFEST]
+    folders = folder_names([grid.volume.name for grid in grids], reserved=reserved)
     volumes = [_write_volume(folder, name, grid) for name, grid in zip(folders, grids, strict=True)]
     digests = {name: _sha256(folder / name) for volume in volumes for name in files_of(volume)}
+    more = {}
+    if isinstance(field, LpvField):
+        digests |= {name: _sha256(folder / name) for name in write_lpv_volume(folder, field)}
+        more["lpv"] = LPV_INDEX
     for name in folders:
         sync_folder(folder / name)
     manifest = {
@@ -111,6 +120,7 @@ def _write_files(folder: Path, field: Field, scene: Scene, settings: dict, seed:
         "includes_direct": bool(field.includes_direct),
         "sh_convention": SH_CONVENTION,
         "volumes": volumes,
+        **more,
         "notes": list(notes),
         "sha256": digests,
         "stats": plain(stats()),

@@ -31,8 +31,8 @@ def place_cascades(scene: Scene, settings: LpvSettings, bounds: np.ndarray) -> t
     center = _center(scene, settings.center, box)
     cell = settings.cell_size
     if cell is None:
-        # Snapping may cost half a cell at either end.
-        cell = 2.0 * float(np.abs(box - center).max()) / (count - 1)
+        # A cell around the walls, of which snapping may cost half: their own thickness lies inside, and they meet faces if they can.
+        cell = 2.0 * float(np.abs(box - center).max()) / (count - 2)
     return tuple(_snapped(center, cell * 2**level, count) for level in range(settings.cascades))
 
 

@@ -26,7 +26,7 @@ FACE_AHEAD = FRONT_SOLID_ANGLE + 4.0 * SIDE_SOLID_ANGLE * SIDE_AHEAD
 # How far in front of a surface its light is taken, in cells; half a cell leads to the centre of the first.
 SURFACE_CELLS = 1.5
 # A cell's centre counts as behind a plane beyond this many cells.
-_BEHIND = 1e-3
+BEHIND_CELLS = 1e-3
 _Y0, _Y1 = 1.0 / np.sqrt(4.0 * pi), np.sqrt(3.0 / (4.0 * pi))
 
 
@@ -82,7 +82,7 @@ def sample(grid: LpvGrid, flat: np.ndarray, points: np.ndarray, planes: np.ndarr
         nx, ny, _ = grid.resolution
         height = sum((position - base[:, axis, None]) * normals[:, axis, None]
                      for axis, position in enumerate((indices % nx, indices // nx % ny, indices // (nx * ny))))
-        weights = np.where(height > -_BEHIND, weights, np.float32(0.0))
+        weights = np.where(height > -BEHIND_CELLS, weights, np.float32(0.0))
         weights /= np.maximum(weights.sum(axis=1, keepdims=True), np.float32(1e-6))
     return np.einsum("nk,nkc->nc", weights, flat[indices]).reshape(-1, 4, 3)
 
