@@ -10,7 +10,7 @@ import numpy as np
 
 from ..numerics.sampling import r2
 from ..techniques.lpv.cascades import shares
-from ..techniques.lpv.gather import FACE_AHEAD, FACE_TOTAL
+from ..techniques.lpv.gather import BEHIND_CELLS, FACE_AHEAD, FACE_TOTAL, SURFACE_CELLS
 from ..techniques.lpv.grid import LpvGrid
 from ..techniques.rsm.gather import GatherMap, Pattern, rotations
 from ..transport.virtual_lights import VirtualLights
@@ -76,8 +76,11 @@ def lpv_gather(grids: tuple[LpvGrid, ...], volumes: tuple[np.ndarray, ...], poin
         atlas = atlas_of(grid.resolution)
         receivers = np.concatenate([grid.cells_of(points), weight[:, None], normals], axis=1)
         light = dict(zip(("light_red", "light_green", "light_blue"), upload_light(volume, atlas), strict=True))
-        total.add(LPV_GATHER, 16, {"resolution": grid.resolution, "columns": atlas.columns, "face_total": FACE_TOTAL,
-                                   "face_ahead": FACE_AHEAD, "inverse_area": 1.0 / grid.cell**2, "dampening": int(dampening)},
+        # Factors of coefficients 0 and 1 to 3: SH constants, the faces' solid angles, over the area of a face.
+        total.add(LPV_GATHER, 16, {"resolution": grid.resolution, "columns": atlas.columns, "dampening": int(dampening),
+                                   "total": np.sqrt(0.25 / np.pi) * FACE_TOTAL / grid.cell**2,
+                                   "along": np.sqrt(0.75 / np.pi) * FACE_AHEAD / grid.cell**2,
+                                   "surface_cells": SURFACE_CELLS, "behind": BEHIND_CELLS},
                   {"receivers": upload(fold(receivers)), **light})
     return total.result()
 

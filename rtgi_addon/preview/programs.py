@@ -71,8 +71,8 @@ LPV_PROPAGATE = Program(
 
 LPV_GATHER = Program(
     "lpv_gather", uniforms=(("parameters", UniformStruct("LpvGatherParameters", (
-        ("ivec3", "resolution"), ("int", "columns"), ("int", "count"), ("int", "first_row"), ("float", "face_total"),
-        ("float", "face_ahead"), ("float", "inverse_area"), ("int", "dampening")))),),
+        ("ivec3", "resolution"), ("int", "columns"), ("int", "count"), ("int", "first_row"), ("int", "dampening"),
+        ("float", "total"), ("float", "along"), ("float", "surface_cells"), ("float", "behind")))),),
     samplers=("receivers", *(f"light_{name}" for name in _RGB)), local_size=_GROUP,
     images=(Image("irradiance", access="READ_WRITE"),))
 
