@@ -86,6 +86,13 @@ class LightPaths:
 _PER_PATH = ("source", "u", "domain", "power", "first", "first_normal", "first_shading")
 
 
+def no_paths() -> LightPaths:
+    """No paths at all."""
+    vectors = np.zeros((0, 3), np.float32)
+    return LightPaths(np.zeros(0, np.int32), np.zeros((0, 2), np.float32), *[vectors] * 8, np.zeros(0, np.int16),
+                      np.zeros(0, np.int64))
+
+
 def join(parts: list[LightPaths]) -> LightPaths:
     """The paths of all ``parts``, in order."""
     starts = np.cumsum([0] + [part.count for part in parts])

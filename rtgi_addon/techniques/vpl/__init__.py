@@ -49,11 +49,11 @@ class VirtualPointLights(Technique):
         context = LightContext(scene, threads)
         progress.stage("virtual lights")
         lights = sample_lights(context, scene.volumes, settings, seed, focus(scene.volumes), progress.span(0.02, 0.2))
-        field = VplField(context, lights, settings, seed, kernels=kernels)
-        field.stats = {"lights": field.lights.count, "distant_lights": field.lights.distant_count, "paths": lights.paths.count}
+        clamp = mean_bound(context, lights) if settings.clamp is None else settings.clamp or None
+        field = VplField(context, lights, settings, seed, clamp, kernels=kernels)
         require_lights(field)
-        if settings.clamp is not None:
-            field.stats["clamp_loss"] = clamp_loss(context, field, lights, settings.clamp)
+        if clamp is not None:
+            field.stats["clamp_loss"] = clamp_loss(context, lights, clamp)
         progress.stage("probes")
         probes = sum(int(np.prod(volume.resolution)) for volume in scene.volumes)
         field.grids(progress.span(0.2, 1.0))
@@ -61,12 +61,26 @@ class VirtualPointLights(Technique):
         return field
 
 
-def clamp_loss(context: LightContext, field: VplField, lights: LightSet, clamp: float) -> float:
-    """Share of the irradiance of surfaces seen from the volumes that the bound ``clamp`` [m⁻²] takes away, before compensation."""
-    points, normals = lights.pilots.surface, lights.pilots.normals
-    whole, cut = (luminance(gather(context, field.lights, points, normals, clamp=bound)).sum(dtype=np.float64)
-                  for bound in (None, clamp))
-    return float(1.0 - cut / whole) if whole > 0 else 0.0
+def mean_bound(context: LightContext, lights: LightSet) -> float | None:
+    """The bound [m⁻²] at which a middling virtual light gives a receiver the mean irradiance of surfaces seen from the volumes, so
+    that its bright spot is about as large as the distance between lights; None where no virtual light reaches them."""
+    flux = float(np.median(luminance(lights.paths.flux))) if len(lights.paths.path) else 0.0
+    mean = _irradiance(context, lights, lights.pilots.bound)
+    return float(np.pi * mean / flux) if mean > 0 and flux > 0 else None
+
+
+def clamp_loss(context: LightContext, lights: LightSet, clamp: float) -> float:
+    """Share of the irradiance by virtual lights, of surfaces seen from the volumes, that the bound ``clamp`` [m⁻²] takes away,
+    before compensation."""
+    whole = _irradiance(context, lights, None)
+    return 1.0 - _irradiance(context, lights, clamp) / whole if whole > 0 else 0.0
+
+
+def _irradiance(context: LightContext, lights: LightSet, clamp: float | None) -> float:
+    """Mean luminance of the irradiance of the pilots' surface points by virtual lights that are not distant."""
+    pilots, near = lights.pilots, lights.lights().with_distant(*np.zeros((2, 0, 3)))
+    return float(luminance(gather(context, near, pilots.surface, pilots.normals, clamp=clamp)).mean(dtype=np.float64)) \
+        if len(pilots.surface) else 0.0
 
 
 TECHNIQUE = VirtualPointLights()

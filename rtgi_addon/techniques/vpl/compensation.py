@@ -32,10 +32,12 @@ class Compensation:
         # Light that arrives at a ray's end is reflected once more there.
         again = lights if bounces is None else lights.take(np.flatnonzero(lights.bounce < bounces))
         stride = max(1, again.count // SUBSET)
-        self._subsets = []
+        self._subsets, self._subset_clamp = [], []
         for offset in range(min(stride, SUBSETS)):
             part = again.take(slice(offset * stride // min(stride, SUBSETS), None, stride))
             gain = np.float32(again.count / max(part.count, 1))
+            # Fewer, brighter lights have larger bright spots.
+            self._subset_clamp.append(clamp / float(gain))
             self._subsets.append(VirtualLights(part.positions, part.normals, part.flux * gain, part.source, part.bounce, part.path,
                                                part.directions, part.irradiance))
 
@@ -114,5 +116,6 @@ class Compensation:
         for number, lights in enumerate(self._subsets):
             chosen = np.flatnonzero(rows % len(self._subsets) == number)
             if chosen.size:
-                irradiance[chosen] += gather(context, lights, points[chosen], shading[chosen], clamp=float(self._clamp), threads=1)
+                irradiance[chosen] += gather(context, lights, points[chosen], shading[chosen], clamp=self._subset_clamp[number],
+                                             threads=1)
         return radiance + surfaces.albedo(primitive, u, v) * irradiance * np.float32(1.0 / np.pi)

@@ -29,30 +29,33 @@ MAX_VISIBILITIES = 1 << 26
 
 
 class VplField(Field):
-    """The light of ``lights`` (a LightSet) in the scene of ``context``. ``relight`` follows lamps that moved."""
+    """The light of ``lights`` (a LightSet) in the scene of ``context``, with geometry terms bounded by ``clamp`` [m⁻²] (None: not
+    at all). ``relight`` follows lamps that moved."""
 
     technique = "vpl"
 
-    def __init__(self, context: LightContext, lights: LightSet, settings: VplSettings, seed: int, *, kernels: Kernels | None = None,
-                 stats: dict | None = None):
-        self._context, self._set, self._settings, self._seed = context, lights, settings, seed
+    def __init__(self, context: LightContext, lights: LightSet, settings: VplSettings, seed: int, clamp: float | None, *,
+                 kernels: Kernels | None = None):
+        self._context, self._set, self._settings, self._seed, self._clamp = context, lights, settings, seed, clamp
         self._kernels = kernels or NUMPY
         self.lights = lights.lights()
         self.includes_direct = settings.direct
         self.params = asdict(settings)
-        self.stats = dict(stats or {})
+        self.stats = {"lights": self.lights.count, "distant_lights": self.lights.distant_count, "paths": lights.paths.count}
+        if clamp is not None:
+            self.stats["clamp"] = clamp
         self._compensation = None
-        if settings.clamp is not None and settings.compensation:
-            self._compensation = Compensation(context, self.lights, settings.clamp, settings.compensation_rays, settings.bounces,
+        if clamp is not None and settings.compensation:
+            self._compensation = Compensation(context, self.lights, clamp, settings.compensation_rays, settings.bounces,
                                               seed)
         self._grids: tuple[ProbeGrid, ...] | None = None
 
     def irradiance(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """See Field. Every receiver casts a shadow ray to every virtual light that faces it."""
         points, normals = np.asarray(points, np.float32), np.asarray(normals, np.float32)
-        context, clamp = self._context, self._settings.clamp
+        context = self._context
         if self._kernels is NUMPY:
-            result = gather(context, self.lights, points, normals, clamp=clamp, threads=context.threads)
+            result = gather(context, self.lights, points, normals, clamp=self._clamp, threads=context.threads)
         else:
             result = self._by_kernel(points, normals)
         if self._compensation is not None:
@@ -64,7 +67,7 @@ class VplField(Field):
     def radiance_sh(self, points: np.ndarray) -> np.ndarray:
         """SH coefficients (n, (order + 1)², 3) float32 of what arrives at free ``points`` (n, 3)."""
         context, settings = self._context, self._settings
-        result = gather_sh(context, self.lights, points, settings.order, clamp=settings.clamp, threads=context.threads)
+        result = gather_sh(context, self.lights, points, settings.order, clamp=self._clamp, threads=context.threads)
         if self._compensation is not None:
             result += self._compensation.coefficients(points, settings.order)
         if settings.direct:
@@ -92,9 +95,8 @@ class VplField(Field):
         (progress or Progress()).check()
         context = self._context.relit(scene)
         lights, change = follow(self._set, self._context, context, self._settings, self._seed)
-        field = VplField(context, lights, self._settings, self._seed, kernels=self._kernels)
-        field.stats = {"lights": field.lights.count, "distant_lights": field.lights.distant_count, "paths": lights.paths.count,
-                       "replaced_paths": change.replaced, "replaced_fraction": change.fraction}
+        field = VplField(context, lights, self._settings, self._seed, self._clamp, kernels=self._kernels)
+        field.stats |= {"replaced_paths": change.replaced, "replaced_fraction": change.fraction}
         require_lights(field)
         return field
 
@@ -105,7 +107,7 @@ class VplField(Field):
         origins = offset_origins(points, normals, normals)
         for span in chunks(len(points), max(1, MAX_VISIBILITIES // max(lights.count, 1))):
             seen = visibility(context, lights, points[span], normals[span])
-            result[span] += self._kernels.vpl_gather(lights, origins[span], normals[span], seen, self._settings.clamp)
+            result[span] += self._kernels.vpl_gather(lights, origins[span], normals[span], seen, self._clamp)
         return result
 
     def _lamp_samples(self):

@@ -22,6 +22,7 @@ from ...transport.light_paths import (
     emitter_paths,
     join,
     lamp_paths,
+    no_paths,
     world_directions,
     world_paths,
 )
@@ -37,6 +38,8 @@ PILOTS = 48
 FLUX_SHARE = 0.1
 # Pilots take lights nearer than this share of the volumes' radius as this near: one of them shall not decide alone.
 NEAREST = 0.1
+# With fewer effective candidates than lights asked for, so many times more paths are traced, in so many rounds at most.
+MORE_PATHS, MAX_ROUNDS = 4, 2
 # One distant light for so many VPLs where there is a world, and candidates tried for each.
 DISTANT_SHARE, DISTANT_CANDIDATES = 0.25, 4
 
@@ -102,22 +105,29 @@ def sample_lights(context: LightContext, volumes: tuple[ProbeVolume, ...], setti
     """About ``settings.lights`` virtual lights for ``volumes``, whose common sphere is ``focus`` (centre, radius)."""
     beam = Beam(np.array(context.geometry.bounds()), *focus)
     pilots = pilots_in(context, volumes, focus[1], seed)
-    counts = paths_per_source(context, beam, focus[1], path_count(settings))
-    parts = parallel_for(lambda i: source_paths(context, counts[i][0], counts[i][1], beam, settings.bounces, seed), len(counts),
-                         context.threads, progress.span(0.0, 0.4), "light paths")
     distant = distant_lights(context, pilots, settings.lights, seed)
-    if not parts:
-        nothing = np.zeros((0, 3), np.float32)
-        parts = [LightPaths(np.zeros(0, np.int32), nothing[:, :2], *[nothing] * 5, nothing, nothing, nothing, np.zeros(0, np.int16),
-                            np.zeros(0, np.int64))]
-    paths = join(parts)
+    for rounds in range(MAX_ROUNDS):
+        span = progress.span(rounds / MAX_ROUNDS, (rounds + 1) / MAX_ROUNDS)
+        counts = paths_per_source(context, beam, focus[1], path_count(settings) * MORE_PATHS**rounds)
+        paths = _all_paths(context, counts, beam, settings.bounces, seed, span.span(0.0, 0.3))
+        transfer = pilot_transfer(context, paths, pilots, span.span(0.3, 1.0))
+        reached = luminance(paths.flux) * transfer
+        # As many as would give the same variance if all gave the same (Kish).
+        if not reached.any() or reached.sum() ** 2 >= settings.lights * (reached**2).sum():
+            break
     # A channel counts by its share of all light in that channel: what is dim in all of them is dim for any eye.
     totals = paths.flux.sum(axis=0, dtype=np.float64)
     weights = np.where(totals > 0, 1.0 / np.maximum(totals, 1e-300), 0.0)
     flux = paths.flux @ weights
-    transfer = pilot_transfer(context, paths, pilots, progress.span(0.4, 1.0))
     scales = _scales(transfer * flux, flux, settings.lights)
     return choose(LightSet(paths, beam, focus[1], pilots, weights, *scales, *distant), paths, flux, transfer, seed)
+
+
+def _all_paths(context, counts, beam, bounces, seed, progress) -> LightPaths:
+    """The paths of every (source, number) in ``counts``."""
+    parts = parallel_for(lambda i: source_paths(context, *counts[i], beam, bounces, seed), len(counts), context.threads, progress,
+                         "light paths")
+    return join(parts) if parts else no_paths()
 
 
 def path_count(settings) -> int:

@@ -15,9 +15,9 @@ class VplSettings:
     bounces: int | None = setting(None, "Bounces", "How often light may be reflected; unset follows it until it has died away", "",
                                   0, 1000)
     direct: bool = setting(False, "Include Lamps", "Add the direct light of lamps, which engines usually add themselves")
-    clamp: float | None = setting(None, "Clamp", "Bound of a virtual light's geometry term: takes away bright spots near surfaces "
-                                  "and the light in corners; unset has no bound", "1/m²", 1e-6, 1e9)
-    compensation: bool = setting(False, "Compensation", "Give back by short rays what the clamp takes away")
+    clamp: float | None = setting(None, "Clamp", "Bound of a virtual light's geometry term, against bright spots near surfaces; "
+                                  "unset lets no light give more than the mean irradiance, 0 has no bound", "1/m²", 0, 1e9)
+    compensation: bool = setting(True, "Compensation", "Give back by short rays what the clamp takes away from corners")
     compensation_rays: int = setting(64, "Compensation Rays", "Short rays per receiver", "", 1, 4096)
-    candidates: int = setting(8, "Candidates", "Virtual lights tried for each that is kept: of more, those that light the volumes "
+    candidates: int = setting(16, "Candidates", "Virtual lights tried for each that is kept: of more, those that light the volumes "
                               "are found more surely", "", 1, 256)
