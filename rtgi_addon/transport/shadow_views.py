@@ -54,19 +54,18 @@ class ShadowView:
     def rays(self) -> tuple[np.ndarray, np.ndarray]:
         """Through every texel's centre, row by row: origins (n, 3) float32 on the near plane and directions (n, 3) float32 that
         reach the far plane at t = 1."""
-        ndc = _texel_centres(self.resolution)
-        grid = np.stack(np.meshgrid(ndc, ndc), axis=-1).reshape(-1, 2)
-        world_from_clip = self.world_from_view @ np.linalg.inv(self.clip_from_view)
-        first, last = (_unproject(world_from_clip, grid, depth) for depth in (-1.0, 1.0))
-        return first.astype(np.float32), (last - first).astype(np.float32)
+        fan, back = self._fan(), self.world_from_view[:3, 2]
+        # A parallel projection spreads its origins, a pinhole its directions.
+        origins = self.position_world + (fan + (1.0 - self.near) * back if self.orthographic else self.near * fan)
+        directions = np.broadcast_to(-back, fan.shape) if self.orthographic else fan
+        return tuple(np.ascontiguousarray(part, np.float32) for part in (origins, (self.far - self.near) * directions))
 
     def directions(self) -> np.ndarray:
         """Unit directions (n, 3) float64 in which light travels through the texels' centres."""
-        x, y = self._window(_texel_centres(self.resolution))
-        view = np.stack([*(part.ravel() for part in np.meshgrid(x, y)), np.full(x.size * y.size, -1.0)], axis=-1)
         if self.orthographic:
-            view[:, :2] = 0.0
-        return (view / np.linalg.norm(view, axis=1, keepdims=True)) @ self.world_from_view[:3, :3].T
+            return np.tile(-self.world_from_view[:3, 2], (self.resolution**2, 1))
+        x, y = self._window(_texel_centres(self.resolution))
+        return self._fan() / np.sqrt(1.0 + x[None, :] ** 2 + y[:, None] ** 2).reshape(-1, 1)
 
     def texel_measure(self) -> np.ndarray:
         """(resolution, resolution) float64: exact solid angle [sr] of each texel, or area [m²] of one of a parallel projection."""
@@ -82,6 +81,12 @@ class ShadowView:
         clip = np.asarray(points, np.float64) @ self.clip_from_world[:, :3].T + self.clip_from_world[:, 3]
         front = clip[:, 3] > 0
         return 0.5 + 0.5 * clip[:, :2] / np.where(front, clip[:, 3], 1.0)[:, None], front
+
+    def _fan(self) -> np.ndarray:
+        """From the eye to the texels' centres at depth 1 (n, 3) float64, world axes, row by row."""
+        x, y = self._window(_texel_centres(self.resolution))
+        right, up, back = self.world_from_view[:3, :3].T
+        return ((y[:, None] * up - back)[:, None] + x[:, None] * right).reshape(-1, 3)
 
     def _window(self, ndc: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """View-space x and y of normalized device coordinates: at depth 1 of a pinhole, anywhere in a parallel projection."""
@@ -288,9 +293,3 @@ def _orthographic(half_width, half_height, near, far) -> np.ndarray:
 
 def _texel_centres(resolution: int) -> np.ndarray:
     return (np.arange(resolution) + 0.5) / resolution * 2.0 - 1.0
-
-
-def _unproject(world_from_clip: np.ndarray, grid: np.ndarray, depth: float) -> np.ndarray:
-    clip = np.concatenate([grid, np.full((len(grid), 1), depth), np.ones((len(grid), 1))], axis=1)
-    world = clip @ world_from_clip.T
-    return world[:, :3] / world[:, 3:]
