@@ -36,12 +36,14 @@ class View:
 
 @dataclass(frozen=True, eq=False)
 class _Draw:
+    """``hidden`` is the winding that culling leaves out, in Blender's words."""
+
     program: object
     batch: gpu.types.GPUBatch
     material: gpu.types.GPUUniformBuf
     images: dict[str, gpu.types.GPUTexture]
     count: int
-    culls: bool
+    hidden: str
 
 
 class SurfacePass:
@@ -53,33 +55,35 @@ class SurfacePass:
         groups: dict[tuple, list[int]] = {}
         for index, instance in enumerate(scene.instances):
             override = tuple(sorted((instance.material_override or {}).items()))
-            groups.setdefault((instance.mesh, override), []).append(index)
+            mirrored = bool(np.linalg.det(np.asarray(instance.world_from_local, np.float64)[:3, :3]) < 0)
+            groups.setdefault((instance.mesh, override, mirrored), []).append(index)
         ordered = [index for members in groups.values() for index in members]
         self._instances = upload(fold(_instance_rows(scene, geometry)[ordered].reshape(len(ordered), -1)))
         self._draws, first = [], 0
         materials = scene.materials or (Material("default"),)
-        for (mesh_index, override), members in groups.items():
+        for (mesh_index, override, mirrored), members in groups.items():
             mesh = scene.meshes[mesh_index]
             for old in np.unique(mesh.triangle_material):
                 material = materials[dict(override).get(int(old), int(old))]
                 triangles = np.flatnonzero(mesh.triangle_material == old).astype(np.int32)
-                self._draws.append(self._draw_of(mesh, triangles, material, first, len(members)))
+                self._draws.append(self._draw_of(mesh, triangles, material, first, len(members), mirrored))
             first += len(members)
 
-    def _draw_of(self, mesh: Mesh, triangles: np.ndarray, material: Material, first: int, count: int) -> _Draw:
+    def _draw_of(self, mesh: Mesh, triangles: np.ndarray, material: Material, first: int, count: int, mirrored: bool) -> _Draw:
         slots = Slots(material, self._inputs)
         smooth = mesh.corner_normals_local is not None
         program = surface_program(self._name, len(slots.uv_layers), len(slots.attributes), smooth)
         batch = gpu.types.GPUBatch(type="TRIS", buf=vertex_buffer(_attributes(mesh, triangles, slots)))
         buffer = uniform_buffer(MATERIAL, uniforms(material, slots, self._inputs, first))
         images = {f"{name}_image": self._images.get(getattr(material, name).texture) for name in self._inputs}
-        return _Draw(program, batch, buffer, images, count, material.backface_culling)
+        backs = "FRONT" if mirrored else "BACK"
+        return _Draw(program, batch, buffer, images, count, backs if material.backface_culling else "NONE")
 
     def draw(self, view: View, samplers: Mapping[str, gpu.types.GPUTexture] | None = None, *, cull: bool = False) -> None:
         """Draw everything into the target that is bound. ``cull`` leaves out the backs of materials that say so."""
         shared = uniform_buffer(VIEW, view.uniforms)
         for draw in self._draws:
-            gpu.state.face_culling_set("BACK" if cull and draw.culls else "NONE")
+            gpu.state.face_culling_set(draw.hidden if cull else "NONE")
             shader, _alive = bind(draw.program, uniforms={"view": shared, "material": draw.material},
                                   samplers={"instances": self._instances, **draw.images, **(samplers or {})})
             draw.batch.draw_instanced(shader, instance_start=0, instance_count=draw.count)

@@ -1,0 +1,39 @@
+"""What a camera sees, as textures without any light in them: the same surfaces and pass as for shadow maps (see `surfaces`)."""
+
+import gpu
+
+from ..scene import Scene
+from ..transport.geometry import Geometry
+from .device import RenderTarget
+from .materials import Images
+from .programs import SURFACE_PASSES
+from .surfaces import SurfacePass, View
+
+OUTPUTS = SURFACE_PASSES["gbuffer"][1]
+
+
+class GBuffer:
+    """Targets of ``width`` × ``height`` texels, row 0 at the bottom.
+
+    ``textures`` by name, all RGBA32F, zero where nothing is seen: ``position`` world and ``normal`` world on the side that is seen,
+    with the triangle in their fourth components (`surfaces.decode_primitive`); ``albedo`` of diffuse transport and the instance's
+    index; ``base_color`` and metallic; ``emission`` [W·sr⁻¹·m⁻²] and roughness.
+    """
+
+    def __init__(self, width: int, height: int):
+        self._target = RenderTarget(width, height, ("RGBA32F",) * len(OUTPUTS), depth=True)
+
+    @property
+    def textures(self) -> dict[str, gpu.types.GPUTexture]:
+        """The targets by name."""
+        return dict(zip(OUTPUTS, self._target.colors, strict=True))
+
+    def draw(self, surfaces: SurfacePass, view: View) -> None:
+        """Fill the targets; backs of materials that cull them are left out."""
+        with self._target.drawing():
+            surfaces.draw(view, cull=True)
+
+
+def gbuffer_surfaces(scene: Scene, geometry: Geometry, images: Images | None = None) -> SurfacePass:
+    """``scene`` ready to be drawn into G-buffers; ``images`` may be shared with other passes."""
+    return SurfacePass(scene, geometry, "gbuffer", images)
