@@ -5,9 +5,9 @@ OUT/lpv/lpv.json                 what is written here, and how to read it
 OUT/lpv/cascade<k>/sh0.exr … sh3.exr    accumulated intensity [W/sr] of each cell: SH 1, y, z, x; channels R G B
 ```
 
-Cascade 0 is the finest. Cells are cubes along the world's axes; slice z is a tile as in the probes' flipbooks. The irradiance on a
-surface is (2 pi/3·Y0·c0 - b·Y1·(c1·n))/cell^2, not below 0, at 1.5 cells in front of it along its normal n; Y0 = .282095, Y1 = .488603 and
-b is ``face_ahead`` of lpv.json.
+Cascade 0 is the finest. Cells are cubes along the world's axes; slice z is a tile as in the probes' flipbooks. The irradiance on
+a surface with normal n is (a·Y0·c0 - b·Y1·(c1·n))/cell^2, not below 0, of the coefficients ``surface_cells`` cells in front of it;
+Y0 = .282095, Y1 = .488603, a is ``face_total`` and b ``face_ahead`` of lpv.json (techniques/lpv/gather.py derives them).
 """
 
 import json

@@ -31,7 +31,7 @@ def place_cascades(scene: Scene, settings: LpvSettings, bounds: np.ndarray) -> t
     center = _center(scene, settings.center, box)
     cell = settings.cell_size
     if cell is None:
-        # A cell around the walls, of which snapping may cost half: their own thickness lies inside, and they meet faces if they can.
+        # A cell beyond the walls on either side, half of which snapping may cost.
         cell = 2.0 * float(np.abs(box - center).max()) / (count - 2)
     return tuple(_snapped(center, cell * 2**level, count) for level in range(settings.cascades))
 
@@ -54,7 +54,8 @@ def _center(scene: Scene, name: str, box: np.ndarray) -> np.ndarray:
         return box.mean(axis=0)
     if name == "camera":
         if not scene.cameras:
-            raise BakeError("the cascades are centred on the camera and the scene has none", "add a camera or set center to volumes")
+            raise BakeError("the cascades are to be centred on the camera and the scene has none",
+                            "add a camera or set center to volumes")
         return np.asarray(scene.cameras[0].world_from_camera, np.float64)[:3, 3]
     for instance in scene.instances:
         if instance.name == name:

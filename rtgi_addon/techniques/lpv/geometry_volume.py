@@ -1,11 +1,12 @@
 """The geometry volume: how much surface stands in the way of light between cells, which way it faces and what it reflects.
 
 Kaplanyan and Dachsbacher 2010, section 5: surface elements (surfels) are gathered in a lattice half a cell off that of the
-light, so that its samples are the corners of the light's cells; B(w) = sum of A·|cos|/s^2 is the chance that light is blocked on
-its way through a face, interpolated from the face's four corners. Unlike the paper's single clamped lobe in SH, which lets a
-quarter of the light through a wall that it meets head-on, A·|cos| is kept exactly for the three axes: coverage is two-sided.
-For the oblique directions to side faces the axes' shares add up, which is exact for surfaces along the axes and too much, by up
-to 1.9 times, for others.
+light, so that its samples are the corners of the light's cells. On the way w through a face with normal f light is blocked with
+chance B(w) = sum of A·|n·w| / (s^2·|f·w|), at most 1, interpolated from the face's four corners: the share of the face's own
+cross-section that surfaces cover. The paper takes the sum from a clamped lobe in SH of order 1 per corner, which lets a quarter
+of the light through a wall that it meets head-on. Here A·|n| is kept for the three axes, so a wall along the cells is tight from
+both sides. For the oblique directions to side faces the axes' shares add up, which is exact for such walls and too much for
+slanted ones.
 """
 
 from dataclasses import dataclass
@@ -101,13 +102,15 @@ def face_blocking(volume: GeometryVolume, bounces: bool = True) -> Blocking:
     nx, ny, _ = grid.resolution
     strides = (1, nx, nx * ny)
     through = np.zeros((3, 4, *grid.shape), np.float32)
-    blocked, normal, reflectance = (np.empty((3, 2, rows, *grid.shape), np.float32) for rows in (2, 3, 3)) if bounces else (None,) * 3
+    blocked = normal = reflectance = None
+    if bounces:
+        blocked, normal, reflectance = (np.empty((3, 2, rows, *grid.shape), np.float32) for rows in (2, 3, 3))
     for axis in range(3):
         face = _face_means(volume.values, axis)
         order = [(axis + turn) % 3 for turn in range(3)]
         ahead, *across = (face[1 + other] for other in order)
         front = np.minimum(ahead, np.float32(1.0))
-        sides = [np.minimum(np.float32(SIDE_AHEAD) * ahead + np.float32(SIDE_ACROSS) * other, np.float32(1.0)) for other in across]
+        sides = [np.minimum(ahead + np.float32(SIDE_ACROSS / SIDE_AHEAD) * other, np.float32(1.0)) for other in across]
         inner = _along(axis, slice(1, -1))
         below = _along(axis, slice(None, -1))
         factors = through[axis][(slice(None), *below)]

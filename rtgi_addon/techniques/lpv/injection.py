@@ -13,7 +13,7 @@ def inject(grid: LpvGrid, positions: np.ndarray, normals: np.ndarray, flux: np.n
     the volume is left out. Sums are in float64.
     """
     cells = np.floor(grid.cells_of(positions) + 0.5 * np.asarray(normals, np.float64)).astype(np.int64)
-    nx, ny, nz = grid.resolution
+    nx, ny = grid.resolution[:2]
     kept = np.flatnonzero(np.all((cells >= 0) & (cells < grid.resolution), axis=1))
     cells, normals, flux = cells[kept], np.asarray(normals)[kept], np.asarray(flux)[kept]
     index = (cells[:, 2] * ny + cells[:, 1]) * nx + cells[:, 0]

@@ -19,8 +19,8 @@ class LpvSettings:
     cell_size: float | None = setting(None, "Cell Size", "Side of the finest cascade's cells; unset fits that cascade around the "
                                       "probe volumes and the room they stand in", "m", 1e-6, 1e6)
     center: str = setting("volumes", "Center", "What the cascades are centred on: 'volumes', 'camera' or the name of an object")
-    steps: int = setting(256, "Steps", "How often light moves on by one cell; games use 8, a room needs several times its cells", "",
-                         1, 4096)
+    steps: int = setting(256, "Steps", "How often light moves on by one cell; games use 8, a room needs many times its cells",
+                         "", 1, 4096)
     bounces: bool = setting(True, "Further Bounces", "Reflect light that meets geometry while it is propagated")
     blocking: bool = setting(True, "Blocking", "Let geometry stop light between cells")
     occluders: str = setting("surfaces", "Occluders", "Geometry that blocks: all surfaces in the volume, or only what lamps and "

@@ -63,7 +63,7 @@ def of_map(context: LightContext, captured: ReflectiveShadowMap) -> Surfels:
 
 
 def of_camera(context: LightContext, camera, resolution: int = CAMERA_RESOLUTION) -> Surfels:
-    """The surfels that ``camera`` (scene.Camera) sees: they block light and reflect what is propagated, and add none of their own."""
+    """The surfels that ``camera`` (scene.Camera) sees: they block and reflect what is propagated, and add no light."""
     projection = np.asarray(camera.clip_from_camera, np.float64)
     bounds = np.array(context.geometry.bounds(), np.float64)
     eye = np.asarray(camera.world_from_camera, np.float64)[:3, 3]
