@@ -61,7 +61,7 @@ def test_a_bundle_counts_them_and_is_checked(tmp_path):
     # A second bake replaces them, and one of probes takes them away.
     bake_scene(build.closed_box(), "lpv", SETTINGS, out)
     (out / "lpv/cascade1/sh2.exr").write_bytes(b"damaged")
-    with pytest.raises(BakeError, match="lpv/cascade1/sh2.exr is cut short or damaged"):
+    with pytest.raises(BakeError, match=r"lpv/cascade1/sh2\.exr is cut short or damaged"):
         read_bundle(out)
     bake_scene(build.closed_box(), "probes", {"rays": 16}, out)
     assert not (out / "lpv").exists() and "lpv" not in read_bundle(out).manifest
@@ -76,7 +76,7 @@ def test_a_volume_called_lpv_has_its_own_folder(tmp_path):
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_what_is_not_finite_is_not_written(tmp_path, value):
-    with pytest.raises(BakeError, match="cascade 1 .* is not finite"):
+    with pytest.raises(BakeError, match=r"cascade 1 .* is not finite"):
         write_lpv_volume(tmp_path, field(value))
 
 

@@ -58,13 +58,14 @@ def test_bounces_and_emission_and_the_world_are_in_it():
     sky = bake(build.open_plane(0.0, world=(1.0, 2.0, 3.0)), steps=200)
     point = np.array([[0.0, 0.0, 1.0]])
     up, down = (sky.irradiance(point, np.array([[0.0, 0, z]]))[0] for z in (1.0, -1.0))
-    assert np.allclose(up / up[0], [1, 2, 3], rtol=1e-3) and np.pi * 0.7 < up[0] < np.pi * 1.5 and down[0] < 0.6 * up[0]
+    assert np.allclose(up / up[0], [1, 2, 3], rtol=1e-3) and 0.5 * np.pi < up[0] < 1.5 * np.pi and down[0] < 0.6 * up[0]
 
 
 def test_a_bright_spot_in_the_sky_shines_in():
     scene = rooms.courtyard()
     lit = bake(scene).irradiance(np.array([[-0.4, 0, 0.8]]), np.array([[0.0, 0, 1]]))
-    dark = bake(replace(scene, world=World.constant((0.2, 0.2, 0.2)))).irradiance(np.array([[-0.4, 0, 0.8]]), np.array([[0.0, 0, 1]]))
+    plain = replace(scene, world=World.constant((0.2, 0.2, 0.2)))
+    dark = bake(plain).irradiance(np.array([[-0.4, 0, 0.8]]), np.array([[0.0, 0, 1]]))
     assert lit[0, 0] > 3 * dark[0, 0] > 0
 
 

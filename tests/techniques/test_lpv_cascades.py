@@ -1,6 +1,7 @@
 """Where cascades lie: nested, snapped, centred, blended."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ def test_a_fitted_cascade_holds_the_room_and_outer_ones_double():
     grids = place_cascades(build.closed_box(half_size=1.0), LpvSettings(cascades=3), BOUNDS)
     assert [grid.resolution for grid in grids] == [(16, 16, 16)] * 3
     assert np.allclose([grid.cell for grid in grids], np.array([1, 2, 4]) * grids[0].cell)
-    for inner, outer in zip(grids[:-1], grids[1:], strict=True):
+    for inner, outer in pairwise(grids):
         assert np.all(np.asarray(outer.corner) <= inner.corner) and np.all(outer.high >= inner.high)
     assert np.all(np.asarray(grids[0].corner) < -1) and np.all(grids[0].high > 1) and grids[0].cell < 0.16
 

@@ -100,7 +100,8 @@ def _geometry_volume(grid: LpvGrid, eyes: list[list[surfels.Surfels]]) -> Geomet
 def _crossing(grid: LpvGrid, coarser: tuple[LpvGrid, ...], volumes: tuple[np.ndarray, ...]) -> sources.Lights:
     """What a coarser cascade sends in through the border of ``grid``."""
     positions, inward = sources.border(grid)
-    return sources.Lights(positions, inward, gather(coarser, volumes, positions, -inward, False) * np.float32(grid.cell**2))
+    irradiance = gather(coarser, volumes, positions, -inward, False)
+    return sources.entering(grid, positions, inward, irradiance * np.float32(grid.cell**2))
 
 
 def _box(grid: LpvGrid) -> str:

@@ -11,7 +11,8 @@ from ...transport.context import LightContext
 from ...transport.parallel import chunks, parallel_for
 from ...transport.reflective_shadow_map import ReflectiveShadowMap
 from ...transport.shadow_views import views_of
-from .grid import LpvGrid
+from .gather import FACE_TOTAL
+from .grid import FRONT_SOLID_ANGLE, SIDE_SOLID_ANGLE, LpvGrid
 
 # Points on emissive surfaces, and rays to the world through each face of the border.
 EMITTER_POINTS, WORLD_RAYS = 1 << 15, 64
@@ -85,7 +86,7 @@ def world_lights(context: LightContext, grid: LpvGrid, seed: int, progress: Prog
         return mean * np.float32(np.pi) + _bright(context, p, n, hash_u32(seed, i))
 
     irradiance = np.concatenate(parallel_for(work, len(spans), context.threads, progress, "light of the world"))
-    return Lights(positions, inward, irradiance * np.float32(grid.cell**2))
+    return entering(grid, positions, inward, irradiance * np.float32(grid.cell**2))
 
 
 def _bright(context, points, normals, seed) -> np.ndarray:
@@ -115,6 +116,23 @@ def border(grid: LpvGrid) -> tuple[np.ndarray, np.ndarray]:
             positions.append(face)
             normals.append(np.tile(np.eye(3)[axis] * inward, (u.size, 1)))
     return np.concatenate(positions).astype(np.float32), np.concatenate(normals).astype(np.float32)
+
+
+def entering(grid: LpvGrid, positions: np.ndarray, inward: np.ndarray, flux: np.ndarray) -> Lights:
+    """Lights for what crosses the border's faces at ``positions`` (f, 3) along ``inward`` (f, 3) with ``flux`` (f, 3) [W].
+
+    Light that comes in evenly goes on to the five other faces of its cell by their solid angles; sent straight ahead it would
+    get much farther in than propagated light does.
+    """
+    tangent = np.roll(inward, 1, axis=1)
+    bitangent = np.roll(inward, 2, axis=1)
+    centers = positions + np.float32(0.5 * grid.cell) * inward
+    onward = [(inward, FRONT_SOLID_ANGLE), *((side, SIDE_SOLID_ANGLE) for side in (tangent, -tangent, bitangent, -bitangent))]
+    parts = []
+    for normals, solid_angle in onward:
+        # Injection moves a light by half a cell along its normal: back to the centre.
+        parts.append(Lights(centers - np.float32(0.5 * grid.cell) * normals, normals, flux * np.float32(solid_angle / FACE_TOTAL)))
+    return joined(parts)
 
 
 def joined(parts: list[Lights]) -> Lights:
