@@ -191,7 +191,7 @@ def _spot_views(light: SpotLight, bounds: np.ndarray):
 
 
 def _area_views(light: AreaLight, bounds: np.ndarray, points: int):
-    """A hemicube at each of ``points`` stratified points: a Fibonacci lattice of the shape, its middle if there is but one."""
+    """A hemicube at each of ``points`` stratified points, or a frustum each if the beam is narrow."""
     normal = np.asarray(light.normal_world, np.float64)
     half_u, half_v, centre = (np.asarray(axis, np.float64) for axis in
                               (light.half_u_world, light.half_v_world, light.position_world))
@@ -213,12 +213,15 @@ def _area_views(light: AreaLight, bounds: np.ndarray, points: int):
 
 
 def _shape_points(shape: str, count: int) -> np.ndarray:
+    """(count, 2) in the square [−1, 1]² or the unit disk: a Fibonacci lattice, moved so that its mean is the middle."""
     index = np.arange(count)
     u, v = (index + 0.5) / count, np.mod(0.5 + index * _GOLDEN_FRACTION, 1.0)
+    points = np.stack([2 * u - 1, 2 * v - 1], axis=-1)
     if shape == "ELLIPSE":
-        radius = np.sqrt(u) if count > 1 else np.zeros(1)
-        return np.stack([radius * np.cos(2 * np.pi * v), radius * np.sin(2 * np.pi * v)], axis=-1)
-    return np.stack([2 * u - 1, 2 * v - 1], axis=-1)
+        points = np.sqrt(u)[:, None] * np.stack([np.cos(2 * np.pi * v), np.sin(2 * np.pi * v)], axis=-1)
+    points -= points.mean(axis=0)
+    reach = np.linalg.norm(points, axis=1) if shape == "ELLIPSE" else np.abs(points).max(axis=1)
+    return points / max(1.0, float(reach.max()))
 
 
 def _spread_gain(light: AreaLight, cosine: np.ndarray) -> np.ndarray:

@@ -108,6 +108,10 @@ def test_views_of_an_area_lamp_stand_on_it_and_share_it():
     assert len(places) == 5 and sum(view.share for view in views[::5]) == pytest.approx(1.0)
     offsets = np.array(sorted(places)) / [1.0, 0.2, 0.1]
     assert np.all(np.sum(offsets**2, axis=1) < 1.0) and np.ptp(offsets[:, 1]) > 0.8
+    for count in range(1, 65):
+        offsets = np.array([view.position_world for view in views_of(context_with(area(0.3, "ELLIPSE")), 0, 8, area_points=count)])
+        offsets = offsets[:, 1:] / [0.2, 0.1]
+        assert offsets.mean(axis=0) == pytest.approx(0.0, abs=1e-12) and np.all(np.sum(offsets**2, axis=1) <= 1 + 1e-9)
     middle, = {tuple(view.position_world) for view in views_of(context_with(light), 0, 8, area_points=1)}
     assert middle == (0.0, 0.0, 0.0)
 
