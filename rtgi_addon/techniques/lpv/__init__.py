@@ -19,6 +19,7 @@ class LightPropagationVolumes(Technique):
     label = "Light Propagation Volumes"
     description = "Light flows from cell to cell of a lattice: fast, smooth, leaks and spreads"
     Settings = LpvSettings
+    tolerance = 0.65
     devices = ("cpu", "gpu")
 
     def bake(self, scene: Scene, settings: LpvSettings, rng: np.random.Generator, progress: Progress, *,
