@@ -8,7 +8,6 @@ from collections.abc import Mapping
 import gpu
 import numpy as np
 
-from ..numerics.sampling import r2
 from ..techniques.lpv.cascades import shares
 from ..techniques.lpv.gather import BEHIND_CELLS, FACE_AHEAD, FACE_TOTAL, SURFACE_CELLS
 from ..techniques.lpv.grid import LpvGrid
@@ -53,15 +52,13 @@ def rsm_gather(maps: tuple[GatherMap, ...], points: np.ndarray, normals: np.ndar
     points, normals = np.asarray(points, np.float32), np.asarray(normals, np.float32)
     total, shift = _Sum(len(points)), rotations(points, pattern.seed)
     for item in maps if len(points) else ():
-        size, in_disk = item.view.resolution, round(item.samples * pattern.disk_share)
-        by_flux = item.samples - in_disk
+        size, (disk, flux) = item.view.resolution, item.places(pattern)
         receivers = np.concatenate([points, shift[:, :1], normals, shift[:, 1:], item.centres(points)], axis=1)
-        places = np.concatenate([r2(in_disk, pattern.seed), r2(by_flux, pattern.seed + 1)])
         texels = item.rows.reshape(size, size, 3, 4).transpose(0, 2, 1, 3).reshape(size, 3 * size, 4)
         total.add(RSM_GATHER, item.samples,
-                  {"size": size, "in_disk": in_disk, "by_flux": by_flux, "disk_radius": pattern.disk_radius},
-                  {"receivers": upload(fold(receivers)), "pattern": upload(fold(places)), "texels": upload(texels),
-                   "cumulative": upload(item.cumulative.reshape(size, size))})
+                  {"size": size, "in_disk": len(disk), "by_flux": len(flux), "disk_radius": pattern.disk_radius},
+                  {"receivers": upload(fold(receivers)), "pattern": upload(fold(np.concatenate([disk, flux]))),
+                   "texels": upload(texels), "cumulative": upload(item.cumulative.reshape(size, size))})
     return total.result()
 
 

@@ -53,11 +53,11 @@ class GatherMap:
 
     ``rows`` (texels, 12) float32: position 0:3, normal 3:6, flux/π 6:9, area/π 9, density over the unit square of samples that
     follow the flux 10, and 0. ``cumulative`` (texels,) int64: running sum of the quantized flux, row by row; ``samples`` is this
-    map's part of its lamp's.
+    map's part of its lamp's, which come after the ``first`` ones of the maps before it.
     """
 
-    def __init__(self, shadow_map: ReflectiveShadowMap, samples: int):
-        self.map, self.samples = shadow_map, samples
+    def __init__(self, shadow_map: ReflectiveShadowMap, samples: int, first: int = 0):
+        self.map, self.samples, self._first = shadow_map, samples, first
         self.view = shadow_map.view
         flux = shadow_map.flux.reshape(-1, 3)
         self.rows = np.zeros((len(flux), 12), np.float32)
@@ -76,6 +76,14 @@ class GatherMap:
         """The rows whose flux is not zero."""
         return self.rows[np.any(self.rows[:, 6:9] > 0, axis=1)]
 
+    def places(self, pattern: Pattern) -> tuple[np.ndarray, np.ndarray]:
+        """The pattern's points (s, 2) float32 in [0, 1)² before they are turned: for the disk, and for what follows the flux.
+
+        A lamp's maps take turns with one sequence, so that maps that see the same do not read the same texels.
+        """
+        in_disk = round(self.samples * pattern.disk_share)
+        return r2(in_disk, pattern.seed, self._first), r2(self.samples - in_disk, pattern.seed + 1, self._first)
+
     def centres(self, points: np.ndarray) -> np.ndarray:
         """Where receivers (n, 3) project into the unit square (n, 2) float32: the nearest point of it for those outside."""
         homogeneous = np.asarray(points, np.float64) @ self.view.clip_from_world[:, :3].T + self.view.clip_from_world[:, 3]
@@ -84,8 +92,10 @@ class GatherMap:
         return np.clip(0.5 + 0.5 * homogeneous[:, :2] / depth[:, None], 0.0, 1.0).astype(np.float32)
 
     def by_flux(self, xi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Texels (n, s) that follow the flux, and places within them (n, s, 2) float32 in the unit square: ``xi`` (n, s, 2) chooses a
-        row by what it holds, then a texel of it, so that the points' evenness in two dimensions is kept."""
+        """Texels (n, s) that follow the flux, and places within them (n, s, 2) float32 in the unit square.
+
+        ``xi`` (n, s, 2) chooses a row by what it holds, then a texel of it: the points' evenness in two dimensions is kept.
+        """
         size, last = self.view.resolution, self.cumulative[self.view.resolution - 1::self.view.resolution]
         target = xi[..., 1].astype(np.float64) * last[-1]
         row = np.searchsorted(last, target, side="right")
@@ -113,7 +123,9 @@ def prepare(maps: tuple[ReflectiveShadowMap, ...], samples: int) -> tuple[Gather
     maps, strength = [item for item, flux in zip(maps, strength, strict=True) if flux > 0], strength[strength > 0]
     lamp = np.array([item.view.lamp for item in maps], np.intp)
     share = 0.5 / np.maximum(np.bincount(lamp)[lamp], 1) + 0.5 * strength / np.bincount(lamp, strength)[lamp] if maps else ()
-    return tuple(GatherMap(item, max(MIN_SAMPLES, round(samples * part))) for item, part in zip(maps, share, strict=True))
+    counts = [max(MIN_SAMPLES, round(samples * part)) for part in share]
+    before = [sum(count for other, count in zip(lamp[:i], counts, strict=False) if other == lamp[i]) for i in range(len(maps))]
+    return tuple(GatherMap(*each) for each in zip(maps, counts, before, strict=True))
 
 
 def gather(maps: tuple[GatherMap, ...], points: np.ndarray, normals: np.ndarray, pattern: Pattern, *, tracer=None,
@@ -187,13 +199,13 @@ def _over_receivers(estimate, maps, count: int, width: int, pairs: int, threads)
 def _sample(item: GatherMap, points: np.ndarray, pattern: Pattern) -> tuple[np.ndarray, np.ndarray]:
     """Texels (n, s, 12) for receivers (n, 3), and how many texels each sample stands for (n, s)."""
     size, radius = item.view.resolution, np.float32(pattern.disk_radius)
-    in_disk = round(item.samples * pattern.disk_share)
-    by_flux = item.samples - in_disk
+    disk_xi, flux_xi = item.places(pattern)
+    in_disk, by_flux = len(disk_xi), len(flux_xi)
     centre = item.centres(points)[:, None]
     shift = rotations(points, pattern.seed)[:, None]
     places, indices = [], []
     if in_disk:
-        xi = np.mod(r2(in_disk, pattern.seed)[None] + shift, np.float32(1.0))
+        xi = np.mod(disk_xi[None] + shift, np.float32(1.0))
         angle = xi[..., 1] * np.float32(2.0 * np.pi)
         reach = (radius * xi[..., 0] * np.sqrt(xi[..., 0]))[..., None]
         place = centre + reach * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
@@ -202,7 +214,7 @@ def _sample(item: GatherMap, points: np.ndarray, pattern: Pattern) -> tuple[np.n
         places.append(place)
         indices.append(np.where(inside, texel[..., 1] * size + texel[..., 0], -1))
     if by_flux:
-        xi = np.mod(r2(by_flux, pattern.seed + 1)[None] + shift, np.float32(1.0))
+        xi = np.mod(flux_xi[None] + shift, np.float32(1.0))
         index, place = item.by_flux(xi)
         places.append(place)
         indices.append(index)
