@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import room_scenes as rooms
 import scene_builders as build
+from shadow_maps import prepared
 
 from rtgi_addon import techniques
 from rtgi_addon.errors import BakeError, Cancelled
@@ -15,6 +16,7 @@ from rtgi_addon.numerics import sh
 from rtgi_addon.progress import Progress
 from rtgi_addon.scene import AreaLight, PointLight, SpotLight, SunLight
 from rtgi_addon.techniques.kernels import NumpyKernels
+from rtgi_addon.techniques.rsm.gather import gather_every_texel
 from rtgi_addon.techniques.rsm.settings import RsmSettings
 from rtgi_addon.transport.context import LightContext
 from rtgi_addon.transport.path import probe_sh
@@ -207,3 +209,20 @@ def test_the_bundle_holds_it(tmp_path):
     assert summary.technique == "rsm" and any("first bounce" in note for note in summary.notes)
     grid, = read_bundle(tmp_path / "bundle").grids
     assert sh.order_of(grid.sh.shape[3]) == 2 and grid.sh[..., 0, :].min() > 0
+
+
+def test_cancelling_is_felt_in_the_middle_of_a_long_sum():
+    """The wish comes with the first texels summed: the gather of one block of probes must not go on to its end."""
+    progress, calls = Progress(), []
+
+    class Tracer:
+        def occluded(self, origins, directions, limits):
+            calls.append(len(origins))
+            progress.cancel()
+            return np.zeros(len(origins), bool)
+
+    _, maps = prepared(build.closed_box(), 128)
+    points = np.random.default_rng(0).uniform(-0.5, 0.5, (64, 3)).astype(np.float32)
+    with pytest.raises(Cancelled):
+        gather_every_texel(maps, points, None, order=1, tracer=Tracer(), threads=1, progress=progress)
+    assert sum(calls) < 0.5 * 64 * sum(len(item.lit) for item in maps)

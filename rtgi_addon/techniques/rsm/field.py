@@ -39,23 +39,20 @@ class LampMaps:
             return self._kernels.rsm_gather(self._prepared, points, normals, self._pattern)
         return gather(self._prepared, points, normals, self._pattern, tracer=self._tracer, threads=self.context.threads)
 
-    @property
-    def radiance_sh(self):
-        """SH of incident radiance as ``resample`` takes it; None where a device that knows irradiance alone is to do the work."""
+    def radiance_sh(self, progress: Progress):
+        """SH of incident radiance as ``resample`` takes it; None where a device that knows irradiance alone is to do the work.
+        ``progress`` is asked for the wish to stop only."""
         if self._on_device and self.settings.order <= MAX_QUADRATURE_ORDER:
             return None
-        return self._projected
+        options = {"tracer": self._tracer, "threads": self.context.threads, "progress": progress}
+        if self.settings.every_texel:
+            return lambda points: gather_every_texel(self._prepared, points, None, order=self.settings.order, **options)
+        return lambda points: gather_sh(self._prepared, points, self.settings.order, self._pattern, **options)
 
     @property
     def _on_device(self) -> bool:
         """The paper's gather runs on the kernels' device; shadow rays and the sum over every texel stay on the CPU."""
         return self._kernels is not NUMPY and self._tracer is None and not self.settings.every_texel
-
-    def _projected(self, points: np.ndarray) -> np.ndarray:
-        order, threads = self.settings.order, self.context.threads
-        if self.settings.every_texel:
-            return gather_every_texel(self._prepared, points, None, order=order, tracer=self._tracer, threads=threads)
-        return gather_sh(self._prepared, points, order, self._pattern, tracer=self._tracer, threads=threads)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +84,7 @@ class Capture:
             span = progress.span(0.3 + 0.7 * number / len(groups), 0.3 + 0.7 * (number + 1) / len(groups))
             own_field = field if own == self.settings else RsmField(self, maps[own])
             made = resample(own_field, self.context, volumes, own.order, span, seed=self.seed, threads=self.context.threads,
-                            radiance_sh=maps[own].radiance_sh)
+                            radiance_sh=maps[own].radiance_sh(span))
             grids |= {id(grid.volume): grid for grid in made}
         return RsmField(self, maps[self.settings], tuple(grids[id(volume)] for volume in self.context.scene.volumes))
 

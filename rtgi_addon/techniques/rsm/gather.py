@@ -22,6 +22,7 @@ import numpy as np
 
 from ...numerics import sh
 from ...numerics.sampling import hash_u32, r2
+from ...progress import Progress
 from ...transport.direct import SHORTENING
 from ...transport.parallel import CHUNK, chunks, parallel_for
 from ...transport.rays import SELF_INTERSECTION, offset_origins
@@ -143,20 +144,26 @@ def gather(maps: tuple[GatherMap, ...], points: np.ndarray, normals: np.ndarray,
 
 
 def gather_sh(maps: tuple[GatherMap, ...], points: np.ndarray, order: int, pattern: Pattern, *, tracer=None,
-              threads: int | None = None) -> np.ndarray:
-    """SH coefficients (n, (order + 1)², 3) float32 of the radiance that arrives at free ``points`` (n, 3) from sampled texels."""
+              threads: int | None = None, progress: Progress | None = None) -> np.ndarray:
+    """SH coefficients (n, (order + 1)², 3) float32 of the radiance that arrives at free ``points`` (n, 3) from sampled texels.
+
+    ``progress`` is asked for the wish to stop only: raises Cancelled.
+    """
     def estimate(rows):
         x = points[rows]
         return sum(_projection(*_sample(item, x, pattern), x, order, tracer) for item in maps)
 
     points = np.ascontiguousarray(points, np.float32)
     most = max((item.samples for item in maps), default=1)
-    return _over_receivers(estimate, maps, len(points), sh.coefficient_count(order), most, threads)
+    return _over_receivers(estimate, maps, len(points), sh.coefficient_count(order), most, threads, progress)
 
 
 def gather_every_texel(maps: tuple[GatherMap, ...], points: np.ndarray, normals: np.ndarray | None, *, order: int = 0,
-                       tracer=None, threads: int | None = None) -> np.ndarray:
-    """The sum that ``gather`` estimates, over all texels: (n, 3), or without ``normals`` the one of ``gather_sh``."""
+                       tracer=None, threads: int | None = None, progress: Progress | None = None) -> np.ndarray:
+    """The sum that ``gather`` estimates, over all texels: (n, 3), or without ``normals`` the one of ``gather_sh``.
+
+    ``progress`` is asked for the wish to stop only: raises Cancelled.
+    """
     def estimate(rows):
         x, total = points[rows], 0
         for item in maps:
@@ -174,7 +181,7 @@ def gather_every_texel(maps: tuple[GatherMap, ...], points: np.ndarray, normals:
     else:
         normals = np.ascontiguousarray(normals, np.float32)
     most = min(max((len(item.lit) for item in maps), default=1), PAIRS)
-    result = _over_receivers(estimate, maps, len(points), width, most, threads)
+    result = _over_receivers(estimate, maps, len(points), width, most, threads, progress)
     return result if normals is None else result[:, 0]
 
 
@@ -186,12 +193,17 @@ def rotations(points: np.ndarray, seed: int) -> np.ndarray:
     return np.stack([hash_u32(state, d) >> np.uint32(8) for d in range(2)], axis=-1).astype(np.float32) * np.float32(2.0**-24)
 
 
-def _over_receivers(estimate, maps, count: int, width: int, pairs: int, threads) -> np.ndarray:
+def _over_receivers(estimate, maps, count: int, width: int, pairs: int, threads, progress: Progress | None = None) -> np.ndarray:
+    def work(i):
+        if progress is not None:
+            progress.check()
+        return estimate(spans[i])
+
     result = np.zeros((count, width, 3), np.float32)
     if not maps:
         return result
     spans = chunks(count, max(1, PAIRS // pairs))
-    for span, part in zip(spans, parallel_for(lambda i: estimate(spans[i]), len(spans), threads), strict=True):
+    for span, part in zip(spans, parallel_for(work, len(spans), threads), strict=True):
         result[span] = part
     return result
 
