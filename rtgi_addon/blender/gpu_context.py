@@ -1,5 +1,7 @@
 """Opening a GPU context in a Blender that has no window."""
 
+import sys
+
 import bpy
 
 from ..errors import BakeError
@@ -12,7 +14,9 @@ def open_context() -> None:
         return
     if not bpy.app.background:
         raise BakeError("Blender has a window but no GPU context on this thread", "bake from the panel, or use --device cpu")
-    context.require_driver()
+    # The command line wins over the preferences.
+    asked = sys.argv[sys.argv.index("--gpu-backend") + 1:][:1] if "--gpu-backend" in sys.argv else []
+    context.require_driver((asked or [bpy.context.preferences.system.gpu_backend])[0].upper() == "VULKAN")
     if not context.initialise():
         _render_once()
     context.require()

@@ -60,13 +60,13 @@ def description() -> str:
     return f"{gpu.platform.backend_type_get()}, {gpu.platform.renderer_get()}, {gpu.platform.version_get()}"
 
 
-def require_driver() -> None:
-    """Raise BakeError where Blender without a window would find no OpenGL: there it ends the process instead of saying so.
+def require_driver(vulkan: bool = False) -> None:
+    """Raise BakeError where Blender without a window would find no GPU: there it ends the process instead of saying so.
 
-    Tries on Linux what Blender is about to do (GHOST_ContextEGL.cc): a context of OpenGL 4.3 on EGL's default display, or on one
-    without surfaces.
+    Tries on Linux what Blender is about to do: a device of Vulkan, if it was told to use ``vulkan`` (without one it goes on with
+    OpenGL); a context of OpenGL 4.3 on EGL's default display, or on one without surfaces (GHOST_ContextEGL.cc).
     """
-    if not sys.platform.startswith("linux"):
+    if not sys.platform.startswith("linux") or (vulkan and _has_vulkan_device()):
         return
     try:
         egl = ctypes.CDLL("libEGL.so.1")
@@ -77,6 +77,20 @@ def require_driver() -> None:
     if not _gives_context(egl, egl.eglGetDisplay(None)) and not _gives_context(
             egl, egl.eglGetPlatformDisplay(_EGL_PLATFORM_SURFACELESS, None, None)):
         raise BakeError("no driver here gives an OpenGL 4.3 context without a window", REMEDY)
+
+
+def _has_vulkan_device() -> bool:
+    try:
+        vulkan = ctypes.CDLL("libvulkan.so.1")
+    except OSError:
+        return False
+    # VkInstanceCreateInfo: its type (1) and no application, layers or extensions.
+    create_info, instance, count = (ctypes.c_uint64 * 8)(1), ctypes.c_void_p(), ctypes.c_uint32()
+    if vulkan.vkCreateInstance(create_info, None, ctypes.byref(instance)) != 0:
+        return False
+    vulkan.vkEnumeratePhysicalDevices(instance, ctypes.byref(count), None)
+    vulkan.vkDestroyInstance(instance, None)
+    return count.value > 0
 
 
 def _gives_context(egl, display: int | None) -> bool:
