@@ -16,7 +16,7 @@ import sys
 from pathlib import Path
 
 from setup_python import find_interpreter
-from setup_system import SetupError, last_line, provide_libraries, say
+from setup_system import SetupError, last_line, provide_gpu_driver, provide_libraries, say
 
 ROOT = Path(__file__).resolve().parent.parent
 REQUIREMENTS = ROOT / "tools" / "requirements.txt"
@@ -98,9 +98,13 @@ def install(wanted):
 
 
 def finish(wanted):
-    """Provide the system libraries that Blender needs, and see that everything can be imported. Raises SetupError."""
+    """Provide the system libraries that Blender needs, and a GPU driver if one can be had, and see that everything can be imported.
+
+    Raises SetupError.
+    """
     for module in glob.glob(str(VENV / "lib" / "python*" / "site-packages" / "bpy" / "__init__*.so")):
         provide_libraries(module, str(PYTHON))
+        provide_gpu_driver(ROOT, str(PYTHON))
     imported = subprocess.run([str(PYTHON), "-I", "-c", IMPORT_ALL], capture_output=True, text=True)
     if imported.returncode != 0:
         raise SetupError(f"`import bpy` fails ({last_line(imported.stderr)}): provide what it names, then run again")

@@ -17,6 +17,19 @@ DEBIAN_PACKAGE = {
     "libvulkan.so.1": "libvulkan1", "libxcb.so.1": "libxcb1", "libxkbcommon.so.0": "libxkbcommon0",
 }
 
+# Software OpenGL, for `--device gpu` and its tests on a machine without a graphics card.
+SOFTWARE_GPU = ("libegl1", "libegl-mesa0", "libgl1-mesa-dri")
+# Asks the product itself whether Blender would find a driver; its folder holds no requirement of its own.
+ASK_FOR_DRIVER = """
+import sys
+sys.path.insert(0, sys.argv[1])
+from rtgi_addon.preview import context
+try:
+    context.require_driver()
+except Exception as error:
+    sys.exit(str(error))
+"""
+
 
 class SetupError(Exception):
     """What is missing and what to do, as one line."""
@@ -88,3 +101,26 @@ def provide_libraries(bpy_module, python):
         also = f" (and whatever provides {', '.join(unknown)})" if unknown else ""
         raise SetupError(f"Blender needs {', '.join(missing)}: sudo apt-get install {' '.join(packages)}{also}, then run again")
     raise SetupError(f"Blender needs {', '.join(unknown or missing)}: install them (any package manager), then run again")
+
+
+def provide_gpu_driver(root, python):
+    """Where Blender would find no GPU driver, not even a software one, install that if it may be done, else say what to install.
+
+    The GPU is optional: nothing here fails the set-up.
+    """
+    def reason():
+        answer = subprocess.run([python, "-I", "-c", ASK_FOR_DRIVER, str(root)], capture_output=True, text=True)
+        return "" if answer.returncode == 0 else last_line(answer.stderr)
+
+    lacking = reason()
+    if not lacking:
+        return
+    if may_apt():
+        say(f"there is no GPU driver: installing {' '.join(SOFTWARE_GPU)} with apt-get, which draw in software")
+        try:
+            apt_install(SOFTWARE_GPU)
+            lacking = reason()
+        except SetupError as error:
+            lacking = str(error)
+    if lacking:
+        say(f"going on without a GPU: {lacking}")
