@@ -19,13 +19,13 @@ from ...scene import AreaLight, Light
 from ...transport.context import LightContext
 from ...transport.light_emission import Emission, connect, emit, near_gain
 from ...transport.light_paths import FROM_WORLD, LightPaths, join, shading_gain, trace
-from ...transport.parallel import chunks
 from ...transport.path_numbers import PathNumbers
 from ...transport.vectors import dot, luminance
+from .cells import Cells
 from .sampling import LightSet, added_paths, distant_lights, path_count, paths_per_source, source_paths
 
 # Rays a path that a lamp's power is counted with.
-SAMPLES = 16
+SAMPLES = 8
 # A path with less than this share of the mean power crowds its neighbours; so many of a lamp's are given up at once.
 CROWDED, GIVEN_UP = 0.2, 0.02
 # With fewer valid paths than this share the lamp has jumped: it is sampled afresh.
@@ -48,7 +48,7 @@ class Change:
 def follow(lights: LightSet, before: LightContext, after: LightContext, settings, seed: int) -> tuple[LightSet, Change]:
     """``lights`` of the scene ``before`` under the lamps and world of ``after``."""
     paths, generation = lights.paths, lights.generation + 1
-    seed = int(hash_u32(seed, generation))
+    own_seed = int(hash_u32(seed, generation))
     old, new = before.scene.lights, after.scene.lights
     same_world = after.environment is before.environment
     kept = np.ones(paths.count, bool)
@@ -65,7 +65,7 @@ def follow(lights: LightSet, before: LightContext, after: LightContext, settings
         if moved is None:
             kept[rows] = False
             if lamp in fresh:
-                added.append(source_paths(after, lamp, rows.size or fresh[lamp], lights.beam, settings.bounces, seed))
+                added.append(source_paths(after, lamp, rows.size or fresh[lamp], lights.beam, settings.bounces, own_seed))
             continue
         stay, power_of_rows, new_paths = moved
         kept[rows[~stay]] = False
@@ -75,14 +75,14 @@ def follow(lights: LightSet, before: LightContext, after: LightContext, settings
         rows = np.flatnonzero(paths.source == FROM_WORLD)
         kept[rows] = False
         if FROM_WORLD in fresh:
-            added.append(source_paths(after, FROM_WORLD, fresh[FROM_WORLD], lights.beam, settings.bounces, seed))
+            added.append(source_paths(after, FROM_WORLD, fresh[FROM_WORLD], lights.beam, settings.bounces, own_seed))
     if same_world and not added:
         return replace(lights, generation=generation), Change(int(paths.met.sum()), 0)
     old_paths = replace(paths, power=power).take_paths(np.flatnonzero(kept))
-    parts = [old_paths, *(added_paths(after, lights, part, seed) for part in added)]
+    parts = [old_paths, *(added_paths(after, lights, part, own_seed) for part in added)]
     result = replace(lights, paths=join(parts), generation=generation)
     if not same_world:
-        directions, irradiance = distant_lights(after, lights.pilots, settings.lights, seed)
+        directions, irradiance = distant_lights(after, lights.pilots, settings.lights, own_seed)
         result = replace(result, directions=directions, irradiance=irradiance)
     return result, Change(int(result.paths.met.sum()), int(sum(part.met.sum() for part in added)))
 
@@ -99,19 +99,19 @@ def _follow_lamp(lights: LightSet, rows: np.ndarray, context: LightContext, lamp
     valid[candidates[blocked]] = False
     if valid.sum() < FRESH_BELOW * len(rows):
         return None
-    # Rays that the lamp would emit now tell each path's share of its power.
+    # Rays that the lamp would emit now tell each path's share of its power: the same ones after every change, or it would flicker.
     index = np.arange(SAMPLES * len(rows))
     key = hash_u32(seed, lamp, 0x696E)
     u = sobol_owen_at(index, 4, key)
     emission = emit(light, u, beam)
-    cells = _Cells(emission.domain, domain[valid])
+    cells = Cells(emission.domain, domain[valid])
     brightness = luminance(emission.power)
     mass = np.bincount(cells.owner, brightness, len(cells.points))
     crowded = np.argsort(mass, kind="stable")[:int(GIVEN_UP * len(rows))]
     crowded = crowded[mass[crowded] < CROWDED * brightness.sum() / len(rows)]
     stay = valid.copy()
     stay[np.flatnonzero(valid)[crowded]] = False
-    cells = _Cells(emission.domain, domain[stay], cells, np.delete(np.arange(len(cells.points)), crowded))
+    cells = Cells(emission.domain, domain[stay], cells, np.delete(np.arange(len(cells.points)), crowded))
     taken = cells.fill(len(rows) - int(stay.sum()))
     part = Emission(*(array[taken] for array in emission))
     numbers = PathNumbers(np.full(len(taken), key), index[taken].astype(np.uint32))
@@ -124,40 +124,6 @@ def _follow_lamp(lights: LightSet, rows: np.ndarray, context: LightContext, lamp
     new_gain = shading_gain(new.first_shading, new.first_normal, part.directions) * near_gain(light, new.first)
     new = replace(new, power=(power[count:] * np.where(new.met, new_gain, 1.0)[:, None]).astype(np.float32))
     return stay, power_of_rows, new
-
-
-class _Cells:
-    """The nearest of ``points`` (n, 3) to each of ``samples`` (k, 3): its ``owner`` (k,) and squared distance."""
-
-    def __init__(self, samples: np.ndarray, points: np.ndarray, known: "_Cells | None" = None, kept: np.ndarray | None = None):
-        self.samples, self.points = samples, points
-        if known is None:
-            self.owner, self._squared = np.zeros(len(samples), np.int64), np.zeros(len(samples), np.float32)
-            rows = np.arange(len(samples))
-        else:
-            # Only the samples of points that are gone have to look for another.
-            number = np.full(len(known.points), -1, np.int64)
-            number[kept] = np.arange(len(kept))
-            self.owner, self._squared = number[known.owner], known._squared.copy()
-            rows = np.flatnonzero(self.owner < 0)
-        norms = (points**2).sum(axis=1)
-        for span in chunks(len(rows), max(1, (1 << 22) // max(len(points), 1))):
-            part = samples[rows[span]]
-            squared = norms - 2.0 * (part @ points.T)
-            nearest = squared.argmin(axis=1)
-            self.owner[rows[span]] = nearest
-            self._squared[rows[span]] = ((part - points[nearest]) ** 2).sum(axis=1)
-
-    def fill(self, count: int) -> np.ndarray:
-        """Make ``count`` samples points, one after the other that which lies farthest from all; their indices (count,)."""
-        taken = np.empty(count, np.int64)
-        for i in range(count):
-            taken[i] = self._squared.argmax()
-            squared = ((self.samples - self.samples[taken[i]]) ** 2).sum(axis=1)
-            nearer = squared < self._squared
-            self.owner[nearer], self._squared[nearer] = len(self.points) + i, squared[nearer]
-        self.points = np.concatenate([self.points, self.samples[taken]])
-        return taken
 
 
 def _can_follow(old: Light, new: Light) -> bool:
