@@ -15,8 +15,10 @@ from . import dependencies
 from .extract import extract_scene
 from .extract.volumes import fit_volume
 from .fingerprint import fingerprint
+from .gpu_context import open_context
 from .properties import scene_settings
 from .session import Finding, session
+from .worker import KernelsOnMainThread
 
 
 def prepare(context) -> Callable[[Progress], object]:
@@ -30,12 +32,22 @@ def prepare(context) -> Callable[[Progress], object]:
     seed = scene.rtgi.seed
     session.findings.pop(scene.name, None)
     session.digests[scene.name] = fingerprint(scene, context.evaluated_depsgraph_get())
+    device = scene.rtgi.device.lower() if "gpu" in technique.devices else "cpu"
+    kernels = _gpu_kernels() if device == "gpu" else None
     extracted = extract_scene(context=context)
 
     def bake(progress: Progress):
-        return bake_scene(extracted, technique.name, out=output, seed=seed, base=asdict(settings), progress=progress)
+        return bake_scene(extracted, technique.name, out=output, seed=seed, base=asdict(settings), progress=progress, device=device,
+                          kernels=None if kernels is None else KernelsOnMainThread(kernels, progress))
 
     return bake
+
+
+def _gpu_kernels():
+    open_context()
+    # Importable once there is a GPU.
+    from ..preview.kernels import GpuKernels
+    return GpuKernels()
 
 
 def check(context) -> list[Finding]:

@@ -119,6 +119,8 @@ class RTGI_PT_render(bpy.types.Panel):
         technique = registry()[settings.technique]
         group = getattr(settings, attribute(technique.name))
         column.prop(settings, "technique")
+        if "gpu" in technique.devices:
+            column.prop(settings, "device")
         if has_goal(technique):
             column.row().prop(settings, "mode", expand=True)
             column.prop(group, "error" if settings.mode == "ERROR" else "rays")

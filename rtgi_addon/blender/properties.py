@@ -169,6 +169,10 @@ def _scene_group(techniques: dict[str, Technique], groups: dict[str, type]) -> t
         "seed": bpy.props.IntProperty(
             name="Seed", description="Start of the random numbers. The same seed gives the same bytes", default=0, min=0,
             update=_changed),
+        "device": bpy.props.EnumProperty(
+            name="Device", description="Where the inner loops of the bake run", default="CPU", update=_changed,
+            items=[("CPU", "CPU", "Every core of the processor"),
+                   ("GPU", "GPU", "The graphics card that Blender draws with; the window waits for it")]),
         "mode": bpy.props.EnumProperty(
             name="Stop At", description="What ends the tracing of a probe", default="ERROR", update=_changed,
             items=[("ERROR", "Error", "Trace each probe until its estimated error is small enough"),

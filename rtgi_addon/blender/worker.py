@@ -1,13 +1,17 @@
-"""A bake on a worker thread, watched from Blender's main thread. Nothing here touches Blender."""
+"""A bake on a worker thread, watched from Blender's main thread, and what of it must run there. Nothing here touches Blender."""
 
 import queue
 import threading
 import traceback
 from collections.abc import Callable
+from concurrent.futures import Future, wait
 from dataclasses import dataclass
 
 from ..errors import BakeError, Cancelled
 from ..progress import Progress
+
+# How long a bake waits for the main thread before it looks whether it was cancelled [s].
+_PATIENCE = 0.05
 
 
 @dataclass(frozen=True)
@@ -40,6 +44,52 @@ class Outcome:
     def cancelled(self) -> bool:
         """True if the user stopped it."""
         return self.summary is None and not self.error
+
+
+class MainThreadCalls:
+    """Runs on the main thread what a bake asks for from its own: Blender's GPU works nowhere else."""
+
+    def __init__(self):
+        self._calls: queue.SimpleQueue[tuple[Future, Callable]] = queue.SimpleQueue()
+
+    def call(self, progress: Progress, function: Callable, *arguments, **options):
+        """``function``'s result, or its exception, from the main thread, which must ``serve``. Raises Cancelled once the user asks
+        ``progress`` to stop, served or not."""
+        if threading.current_thread() is threading.main_thread():
+            return function(*arguments, **options)
+        progress.check()
+        future: Future = Future()
+        self._calls.put((future, lambda: function(*arguments, **options)))
+        while not wait([future], timeout=_PATIENCE).done:
+            if progress.cancelled:
+                future.cancel()
+                progress.check()
+        return future.result()
+
+    def serve(self) -> None:
+        """Run all that waits. For the main thread."""
+        while not self._calls.empty():
+            future, function = self._calls.get()
+            if not future.set_running_or_notify_cancel():
+                continue
+            try:
+                future.set_result(function())
+            except BaseException as error:  # it belongs to who asked
+                future.set_exception(error)
+
+
+main_thread = MainThreadCalls()
+
+
+class KernelsOnMainThread:
+    """Kernels (techniques/kernels.py) whose every call runs through ``main_thread``."""
+
+    def __init__(self, kernels, progress: Progress):
+        self._kernels, self._progress = kernels, progress
+
+    def __getattr__(self, name: str) -> Callable:
+        kernel = getattr(self._kernels, name)
+        return lambda *arguments, **options: main_thread.call(self._progress, kernel, *arguments, **options)
 
 
 class BakeWorker:
@@ -76,7 +126,9 @@ class BakeWorker:
         self._thread.start()
 
     def poll(self) -> bool:
-        """Take in what the thread has reported since; True while it is at work. For the main thread."""
+        """Do what the thread needs the main thread for, and take in what it has reported since; True while it is at work. For the
+        main thread."""
+        main_thread.serve()
         running = self.running
         while not self._reports.empty():
             self.report = self._reports.get()
