@@ -14,16 +14,16 @@ from .rays import offset_origins
 from .texels import TexelLayout
 from .vectors import dot, luminance
 
-# Points in the pool, by which a patch's pattern of light and shadow is known.
+# Points tried for the pool, by which a patch's pattern of light and shadow is known.
 POOL = 1 << 15
 # Connections from each texel to the pool.
 TEXEL_SAMPLES = 16
 
 
 class BrightSurfaces:
-    """Bright slots and a pool of points on them. ``count`` is the number of points, 0 where no surface is bright.
+    """Bright slots and a pool of lit points on them. ``count`` is the number of points, 0 where no surface is bright.
 
-    ``pdf_area`` maps a slot's texels to the density [m⁻²] of pool points on them: index it by texel; the last row is 0.
+    ``pdf_area`` maps a slot's texels to the density [m⁻²] of pool points on their lit parts: index it by texel; the last row is 0.
     """
 
     def __init__(self, context: LightContext, layout: TexelLayout, slots: np.ndarray, radiance: np.ndarray, light_at, seed: int):
@@ -50,9 +50,14 @@ class BrightSurfaces:
         xi = sobol_owen_at(index, 4, hash_u32(seed, unique)[chosen])
         density = (power / power.sum() / slot_area).astype(np.float32)
         primitive, u, v = (part[0] for part in layout.sample(unique[chosen], xi[None, :, :2]))
-        radiance, self._points, self._normals = light_at(unique[chosen], primitive, u, v, xi[:, 2:])
-        self._radiance, self._density = radiance, density[chosen]
-        self.count = POOL
+        radiance, points, normals = light_at(unique[chosen], primitive, u, v, xi[:, 2:])
+        # What lies in shadow within a bright slot would only waste connections. Those that are left stand for all.
+        lit = np.flatnonzero(radiance.any(axis=1))
+        if lit.size == 0:
+            return
+        density *= np.float32(POOL / lit.size)
+        self.count = lit.size
+        self._points, self._normals, self._radiance, self._density = points[lit], normals[lit], radiance[lit], density[chosen[lit]]
         self._slots, self._slot_density = unique.astype(np.int32), density
         self.cover(slots)
 
@@ -100,7 +105,6 @@ class BrightSurfaces:
         direction = towards / distance[:, None]
         radiance = np.take(self._radiance, pick, axis=0)
         transfer = np.maximum(-dot(np.take(self._normals, pick, axis=0), direction), 0) / squared
-        transfer *= radiance[:, 0] + radiance[:, 1] + radiance[:, 2] > 0
         if receiver is not None:
             shading, face = receiver
             transfer *= np.maximum(dot(shading, direction), 0) * (dot(face, direction) > 0)

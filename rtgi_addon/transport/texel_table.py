@@ -5,9 +5,9 @@ other, and a mean over the hidden strip beneath the wall would darken both. So a
 surface, from one point of the slot that a ray really reached (its seed). Where a slot's rim or interior is obstructed, each hit
 in it is tested against the seed, and those that do not see it make further texels with seeds of their own.
 
-Emitters that hang close above a surface part it just as well: the ceiling over a lamp's panel is the brightest spot of a room,
-which no one sees, and the ceiling beside it must not share its light. So points close under an emitter make one texel, points
-beside it another.
+What hangs close above a surface parts it just as well, though the two sides see each other through the gap: the floor beside a
+crate that stands a few millimetres above it must not share the darkness beneath, nor the ceiling beside a lamp's panel the
+light behind it, which no one sees. So points close under anything make one texel, points beside it another.
 """
 
 from dataclasses import dataclass
@@ -25,9 +25,9 @@ MAX_PARTS = 4
 # Segments between two points of a texel end this share short: rounding must not take the far end's own surface for a wall.
 # Much more, and a seed close to a wall would see both its sides.
 _SHORT = np.float32(1.0 - 1e-6)
-# A point is covered by an emitter less than this share of a texel's side above it. Light from higher up has soft edges, which
-# texels hold well enough.
-COVER = np.float32(0.5)
+# A point is covered by what is less than this share of a texel's side above it, or by an emitter less than that. Things higher up
+# have soft edges of shadow and light, which texels hold well enough.
+COVER, EMITTER_COVER = np.float32(0.25), np.float32(0.5)
 # Sides of a cell's rim and diagonals, as pairs of corners.
 _RIM = np.array([(0, 1), (1, 2), (2, 3), (3, 4), (4, 0), (0, 2), (0, 3), (1, 4)])
 
@@ -54,7 +54,7 @@ class SurfaceHits:
 
 class TexelTable:
     """Grows by ``resolve``; rows are never moved. ``slots`` (n,) int32, ``seeds`` their SurfaceHits, ``mixed`` (n,) bool: the
-    slot is obstructed; ``covered`` (n,) bool: an emitter is close above the seed; ``accepted`` (n, points) bool: which
+    slot is obstructed; ``covered`` (n,) bool: something is close above the seed; ``accepted`` (n, points) bool: which
     of the slot's sample points see the seed and are covered like it.
 
     ``sample_numbers(slots)`` returns (points, n, 2) numbers in [0, 1), the same ones whenever it is asked.
@@ -171,16 +171,18 @@ class TexelTable:
         return apart
 
     def _covered(self, hits: SurfaceHits) -> np.ndarray:
-        """(n,) bool: whether an emitter is close above the surface."""
+        """(n,) bool: whether anything is close above the surface."""
         geometry, surfaces = self._context.geometry, self._context.surfaces
-        covered = np.zeros(len(hits.slots), bool)
-        if len(covered) and surfaces.has_emission:
-            side = np.where(hits.slots & 1, np.float32(1), np.float32(-1))[:, None]
-            normal = geometry.normals_world[hits.primitive] * side
-            points = offset_origins(geometry.points(hits.primitive, hits.u, hits.v), normal, normal)
-            above = self._context.tracer.intersect(points, normal, COVER * self._layout.sizes(hits.primitive)).primitive
-            rows = np.flatnonzero(above >= 0)
-            covered[rows] = surfaces.emissive[geometry.material[above[rows]]]
+        side = np.where(hits.slots & 1, np.float32(1), np.float32(-1))[:, None]
+        normal = geometry.normals_world[hits.primitive] * side
+        points = offset_origins(geometry.points(hits.primitive, hits.u, hits.v), normal, normal)
+        size = self._layout.sizes(hits.primitive)
+        if not surfaces.has_emission:
+            return self._context.tracer.occluded(points, normal, COVER * size)
+        above = self._context.tracer.intersect(points, normal, EMITTER_COVER * size)
+        covered = above.primitive >= 0
+        rows = np.flatnonzero(covered & (above.t > COVER * size))
+        covered[rows] = surfaces.emissive[geometry.material[above.primitive[rows]]]
         return covered
 
     def _lifted(self, hits: SurfaceHits):

@@ -2,18 +2,18 @@
 
 An Owen-scrambled Sobol sequence errs like c·N^−slope. The estimates from its first N₁ and its next N₂ points are nearly
 independent, so their mean square difference is c²(N₁^−2s + N₂^−2s): that gives c, and with it the error of all N₁ + N₂ points
-and the number that a smaller error takes. The slope is the literature's (−.77 to −.81 measured on probes, PHYSICS.md §5), taken
-with caution.
+and the number that a smaller error takes. The slope is what rays at sharp patches of light reach (−.66 measured in a sunlit
+atrium); smooth rooms do better (−.77 to −.81, PHYSICS.md §5).
 """
 
 import numpy as np
 
 FIRST_ROUND = 256
-SLOPE = 0.7
+SLOPE = 0.65
 # One probe's difference is one sample of its error: lean on the mean of its neighbours by this share.
 POOLED = 0.5
 # Share of the target left to the sampling of probe rays; the rest is for the surface cache.
-SAMPLING_SHARE = 0.8
+SAMPLING_SHARE = 0.75
 # A round goes this share of the way that the last estimate asks for, so that an overestimate is noticed before it is paid for.
 STRIDE = 0.7
 
