@@ -15,15 +15,15 @@ from ..techniques.rsm.gather import GatherMap, Pattern, rotations
 from ..transport.virtual_lights import VirtualLights
 from .device import dispatch
 from .light_volume import atlas_of, upload_light
+from .packing import FOLD_WIDTH, LIGHTS_PER_TEXEL, fold, light_rows, map_texels, unfold, visibility_bits
 from .program import Program
 from .programs import LPV_GATHER, RSM_GATHER, VPL_GATHER
-from .textures import FOLD_WIDTH, download, empty, fold, unfold, upload
+from .textures import download, empty, upload
 
 # Pairs of a receiver and what it sums over in one dispatch: drivers end what takes seconds.
 _PAIRS_PER_DISPATCH = 1 << 27
 # Lights and texels of visibility that one image of receivers is gathered from at once.
 _LIGHTS_AT_ONCE, _VISIBILITY_TEXELS = 1 << 16, 1 << 24
-_BITS = 24
 
 
 class _Sum:
@@ -54,11 +54,10 @@ def rsm_gather(maps: tuple[GatherMap, ...], points: np.ndarray, normals: np.ndar
     for item in maps if len(points) else ():
         size, (disk, flux) = item.view.resolution, item.places(pattern)
         receivers = np.concatenate([points, shift[:, :1], normals, shift[:, 1:], item.centres(points)], axis=1)
-        texels = item.rows.reshape(size, size, 3, 4).transpose(0, 2, 1, 3).reshape(size, 3 * size, 4)
         total.add(RSM_GATHER, item.samples,
                   {"size": size, "in_disk": len(disk), "by_flux": len(flux), "disk_radius": pattern.disk_radius},
                   {"receivers": upload(fold(receivers)), "pattern": upload(fold(np.concatenate([disk, flux]))),
-                   "texels": upload(texels), "cumulative": upload(item.cumulative.reshape(size, size))})
+                   "texels": upload(map_texels(item)), "cumulative": upload(item.cumulative.reshape(size, size))})
     return total.result()
 
 
@@ -89,7 +88,7 @@ def vpl_gather(lights: VirtualLights, points: np.ndarray, normals: np.ndarray, v
     rows[:, :3], rows[:, 4:] = points, normals
     if visibility is None:
         return _vpl_block(lights, rows, None, clamp)
-    per_receiver = -(-min(lights.count, _LIGHTS_AT_ONCE) // (4 * _BITS))
+    per_receiver = -(-min(lights.count, _LIGHTS_AT_ONCE) // LIGHTS_PER_TEXEL)
     step = max(_VISIBILITY_TEXELS // max(per_receiver, 1), 1)
     parts = [_vpl_block(lights, rows[start:start + step], visibility[start:start + step], clamp)
              for start in range(0, len(rows), step)]
@@ -101,20 +100,8 @@ def _vpl_block(lights: VirtualLights, rows: np.ndarray, visibility: np.ndarray |
     receivers, unused = upload(fold(rows)), upload(np.zeros((1, 1, 4), np.float32))
     for start in range(0, lights.count if len(rows) else 0, _LIGHTS_AT_ONCE):
         part = lights.take(slice(start, start + _LIGHTS_AT_ONCE))
-        table = np.zeros((part.count, 12), np.float32)
-        table[:, 0:3], table[:, 4:7], table[:, 8:11] = part.positions, part.normals, part.flux / np.float32(np.pi)
-        seen = unused if visibility is None else upload(fold(_packed(visibility[:, start:start + part.count])))
+        seen = unused if visibility is None else upload(fold(visibility_bits(visibility[:, start:start + part.count])))
         total.add(VPL_GATHER, part.count, {"lights": part.count, "has_visibility": int(visibility is not None),
                                            "clamp_at": -1.0 if clamp is None else clamp},
-                  {"receivers": receivers, "lights": upload(fold(table)), "visibility": seen})
+                  {"receivers": receivers, "lights": upload(fold(light_rows(part))), "visibility": seen})
     return total.result()
-
-
-def _packed(visibility: np.ndarray) -> np.ndarray:
-    """(n, m) bool as floats (n, 4k) of 24 bits, which a float holds exactly."""
-    n, m = visibility.shape
-    words = -(-m // (4 * _BITS)) * 4
-    bits = np.zeros((n, words * _BITS), bool)
-    bits[:, :m] = visibility
-    packed = np.packbits(bits, axis=1, bitorder="little").reshape(n, words, 3).astype(np.uint32)
-    return (packed[..., 0] | packed[..., 1] << 8 | packed[..., 2] << 16).astype(np.float32)

@@ -12,19 +12,18 @@ from ..techniques.lpv.geometry_volume import Blocking
 from ..techniques.lpv.grid import PER_FLUX, PER_VECTOR, SIDE_AHEAD, LpvGrid
 from .atlas import Atlas
 from .device import RenderTarget, bind, dispatch, vertex_buffer
+from .packing import BLOCK_COLUMNS, FLUX_SCALE, face_blocks
 from .programs import LPV_INJECT, LPV_PROPAGATE
 from .textures import download, empty, upload
 
 _CHANNELS = ("red", "green", "blue")
-_BLOCK_COLUMNS = 4
-_UNIT = np.array([1.0 / PER_FLUX, *[1.0 / PER_VECTOR] * 3], np.float32)
 
 LightTextures = tuple[gpu.types.GPUTexture, gpu.types.GPUTexture, gpu.types.GPUTexture]
 
 
 def atlas_of(resolution) -> Atlas:
     """The layout of a volume on this GPU, with room for the blocks of ``FaceTextures``. Raises BakeError for one too large."""
-    return Atlas.of(resolution, gpu.capabilities.max_texture_size_get() // _BLOCK_COLUMNS)
+    return Atlas.of(resolution, gpu.capabilities.max_texture_size_get() // BLOCK_COLUMNS)
 
 
 def inject_lights(grid: LpvGrid, positions: np.ndarray, normals: np.ndarray, flux: np.ndarray) -> LightTextures:
@@ -51,27 +50,7 @@ class FaceTextures:
     def __init__(self, resolution: tuple[int, int, int], blocking: Blocking):
         self.atlas = atlas_of(resolution)
         self.bounces = blocking.reflectance is not None
-        shape = tuple(resolution)[::-1]
-        self.faces = upload(self._blocks([rows.reshape(4, *shape) for rows in blocking.through]))
-        blockers = [np.zeros((4, *shape), np.float32)]
-        if self.bounces:
-            blockers = []
-            for axis in range(3):
-                for end in range(2):
-                    blocked, normal, albedo = (part[axis, end].reshape(-1, *shape)
-                                               for part in (blocking.blocked, blocking.normal, blocking.reflectance))
-                    blockers += [np.stack([*blocked, normal[0], normal[1]]), np.stack([*albedo, normal[2]])]
-        self.blockers = upload(self._blocks(blockers))
-
-    def _blocks(self, volumes: list[np.ndarray]) -> np.ndarray:
-        """Volumes (4, nz, ny, nx) as atlases side by side, four in a row."""
-        width, height = self.atlas.size
-        columns, rows = min(len(volumes), _BLOCK_COLUMNS), -(-len(volumes) // _BLOCK_COLUMNS)
-        texels = np.zeros((rows * height, columns * width, 4), np.float32)
-        for block, volume in enumerate(volumes):
-            x, y = block % _BLOCK_COLUMNS * width, block // _BLOCK_COLUMNS * height
-            texels[y:y + height, x:x + width] = self.atlas.pack(np.moveaxis(volume, 0, -1))
-        return texels
+        self.faces, self.blockers = (upload(texels) for texels in face_blocks(self.atlas, blocking))
 
 
 def propagate_light(light: LightTextures, faces: FaceTextures, steps: int, progress: Progress | None = None) -> LightTextures:
@@ -115,5 +94,5 @@ def propagate(coefficients: np.ndarray, blocking: Blocking, steps: int, *, threa
               progress: Progress | None = None) -> np.ndarray:
     """See techniques.lpv.propagation.propagate; ``threads`` are the GPU's own."""
     faces = FaceTextures(coefficients.shape[:1:-1], blocking)
-    light = upload_light(coefficients, faces.atlas, _UNIT)
-    return download_light(propagate_light(light, faces, steps, progress), faces.atlas, 1.0 / _UNIT)
+    light = upload_light(coefficients, faces.atlas, FLUX_SCALE)
+    return download_light(propagate_light(light, faces, steps, progress), faces.atlas, 1.0 / FLUX_SCALE)

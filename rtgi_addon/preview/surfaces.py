@@ -14,8 +14,9 @@ from ..scene import Material, Mesh, Scene
 from ..transport.geometry import Geometry
 from .device import bind, uniform_buffer, vertex_buffer
 from .materials import Images, Slots, uniforms
+from .packing import fold
 from .programs import MATERIAL, SURFACE_PASSES, VIEW, surface_program
-from .textures import fold, upload
+from .textures import upload
 
 
 @dataclass(frozen=True, eq=False)

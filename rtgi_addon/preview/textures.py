@@ -1,7 +1,7 @@
 """Arrays to textures and back.
 
 Blender's module reads 3D textures and layers wrongly before 5.2 and has no storage buffers, so everything is a 2D texture of
-floats: lists are folded into rows (``fold``), volumes into tiles (see `atlas`).
+floats: lists are folded into rows (see `packing`), volumes into tiles (see `atlas`).
 """
 
 import gpu
@@ -10,8 +10,6 @@ import numpy as np
 from ..errors import BakeError
 
 CHANNELS = {"R32F": 1, "RGBA32F": 4, "RGBA16F": 4, "RGBA8": 4}
-# Wide enough for a GPU, and low enough that a list of millions stays below the largest texture.
-FOLD_WIDTH = 4096
 
 
 def upload(values: np.ndarray, format: str | None = None) -> gpu.types.GPUTexture:
@@ -42,22 +40,6 @@ def download(texture: gpu.types.GPUTexture) -> np.ndarray:
     buffer.dimensions = texture.width * texture.height * channels
     shape = (texture.height, texture.width) if channels == 1 else (texture.height, texture.width, channels)
     return np.frombuffer(buffer, np.float32).reshape(shape).copy()
-
-
-def fold(rows: np.ndarray) -> np.ndarray:
-    """A list (n, c) as texels (h, w, 4), for include/list.glsl: an item takes as many texels as c needs, one after the other, and
-    never goes over the end of a row."""
-    n, channels = rows.shape
-    parts = max(-(-channels // 4), 1)
-    per_row = max(min(n, FOLD_WIDTH // parts), 1)
-    items = np.zeros((max(-(-n // per_row), 1) * per_row, parts * 4), np.float32)
-    items[:n, :channels] = rows
-    return items.reshape(-1, per_row * parts, 4)
-
-
-def unfold(texels: np.ndarray, n: int, channels: int) -> np.ndarray:
-    """The first ``n`` items (n, channels ≤ 4) of what ``fold`` made."""
-    return np.ascontiguousarray(texels.reshape(-1, 4)[:n, :channels])
 
 
 def _require_size(width: int, height: int) -> None:

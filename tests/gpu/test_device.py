@@ -28,19 +28,6 @@ def test_a_new_texture_is_empty_and_a_huge_one_is_refused(gpu_device):
         empty(1 << 20, 4)
 
 
-@pytest.mark.parametrize(("n", "channels"), [(1, 3), (5000, 4), (10000, 7), (4097, 12)])
-def test_a_folded_list_keeps_items_whole(gpu_device, n, channels):
-    from rtgi_addon.preview.textures import FOLD_WIDTH, fold
-    rows = np.random.default_rng(0).random((n, channels)).astype(np.float32)
-    texels = fold(rows)
-    parts = -(-channels // 4)
-    per_row = texels.shape[1] // parts
-    assert texels.shape[1] <= FOLD_WIDTH and texels.shape[1] % parts == 0
-    i = n - 1
-    item = texels[i // per_row, i % per_row * parts:(i % per_row + 1) * parts].reshape(-1)
-    assert np.array_equal(item[:channels], rows[i])
-
-
 def test_every_member_of_a_struct_arrives(gpu_device, monkeypatch):
     """The layout of UniformStruct is the driver's own: a program adds up what it reads, each member with its own weight."""
     from rtgi_addon.preview import device, sources, textures
