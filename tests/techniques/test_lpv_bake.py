@@ -10,11 +10,14 @@ import scene_builders as build
 from rtgi_addon import techniques
 from rtgi_addon.errors import BakeError, Cancelled
 from rtgi_addon.progress import Progress
-from rtgi_addon.scene import Camera, World
+from rtgi_addon.scene import Camera, SpotLight, World
 from rtgi_addon.techniques.lpv.field import LpvField
 from rtgi_addon.techniques.lpv.settings import LpvSettings
 
 QUICK = {"resolution": 12, "steps": 80, "map_resolution": 48}
+
+
+LAMP_INTO_THE_VOID = SpotLight("up", np.array([0, 0, 1.0]), np.array([0, 0, 1.0]), np.ones(3, np.float32), 0.5)
 
 
 def bake(scene, seed=0, threads=None, **settings):
@@ -51,14 +54,20 @@ def test_light_scales_with_the_lamp_and_takes_the_colour_of_the_walls():
 
 def test_bounces_and_emission_and_the_world_are_in_it():
     scene = build.closed_box(albedo=0.7)
-    once, often = (bake(scene, bounces=bounces).irradiance(*walls()).mean() for bounces in (False, True))
+    once, often = (bake(scene, further_bounces=bounces).irradiance(*walls()).mean() for bounces in (False, True))
     assert often > 1.5 * once > 0
     furnace = bake(build.cube_furnace(0.5, 1.0), steps=200).irradiance(*walls())
     assert furnace.mean() == pytest.approx(2 * np.pi, rel=0.2)
-    sky = bake(build.open_plane(0.0, world=(1.0, 2.0, 3.0)), steps=200)
-    point = np.array([[0.0, 0.0, 1.0]])
-    up, down = (sky.irradiance(point, np.array([[0.0, 0, z]]))[0] for z in (1.0, -1.0))
-    assert np.allclose(up / up[0], [1, 2, 3], rtol=1e-3) and 0.5 * np.pi < up[0] < 1.5 * np.pi and down[0] < 0.6 * up[0]
+
+
+def test_a_sky_is_seen_as_it_is_and_reflected_by_the_ground():
+    points = np.random.default_rng(0).uniform([-0.3, -0.3, 0.7], [0.3, 0.3, 1.3], (50, 3))
+    up, down = (np.tile([0.0, 0, z], (50, 1)) for z in (1.0, -1.0))
+    black, grey = (bake(build.open_plane(albedo, world=(1.0, 2.0, 3.0), half_size=3000.0)) for albedo in (0.0, 0.5))
+    assert np.allclose(black.irradiance(points, up), np.pi * np.array([1, 2, 3]), rtol=0.02)
+    assert black.irradiance(points, down).max() < 0.02
+    # An endless ground sends back 0.5 pi; what lies outside the volume is not known.
+    assert 0.2 * np.pi < grey.irradiance(points, down)[:, 0].mean() < 0.6 * np.pi
 
 
 def test_a_bright_spot_in_the_sky_shines_in():
@@ -137,6 +146,8 @@ def test_a_fine_cascade_gets_light_from_beyond_its_border():
 @pytest.mark.parametrize(("scene", "settings", "words"), [
     (replace(build.closed_box(), volumes=()), {}, "no probe volume"),
     (build.scene([rooms.moved(build.cube("far", 0.1), (0, 0, 50))], world=1.0), {}, "cascade 0 .* holds no geometry"),
+    (build.scene([build.cube("room")], lights=[build.point_light((0, 0, 9.0))]), {"center": "nobody"}, "center is 'nobody'"),
+    (build.scene([build.plane("floor", 3.0)], lights=[LAMP_INTO_THE_VOID]), {}, "no lamp lights any surface"),
     (build.closed_box(), {"cell_size": 1e-3}, "lights nothing inside|holds no geometry"),
     (build.scene([build.cube("room", 1.0, inward=True), rooms.moved(build.cube("other", 1.0, inward=True), (50, 0, 0))],
                  lights=[build.point_light(), build.point_light((50, 0, 0), name="far lamp")]), {},

@@ -1,6 +1,6 @@
 """One bake of light propagation volumes: geometry once, light as often as it changes."""
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from .cascades import place_cascades
 from .field import LpvField
 from .gather import gather
 from .geometry_volume import Blocking, GeometryVolume, combine, face_blocking, inject_surfels, vacuum
-from .grid import LpvGrid, total_flux
+from .grid import LpvGrid
 from .settings import LpvSettings
 
 
@@ -38,7 +38,7 @@ class LpvBake:
             if volume.is_empty:
                 raise BakeError(f"cascade {level} of the light propagation volumes ({_box(grid)}) holds no geometry",
                                 "move its center, raise cell_size, or bake the technique 'probes' there")
-            blocking.append(face_blocking(volume, self.settings.bounces) if self.settings.blocking else vacuum(grid))
+            blocking.append(face_blocking(volume, self.settings.further_bounces) if self.settings.blocking else vacuum(grid))
         return blocking
 
     def _seen(self) -> list[list[surfels.Surfels]]:
@@ -51,27 +51,33 @@ class LpvBake:
 
     def light(self, progress: Progress) -> LpvField:
         """Inject, propagate and accumulate, coarsest cascade first: what it holds at a finer one's border shines into that."""
-        context, settings = self.context, self.settings
+        context, count = self.context, len(self.grids)
         lights = sources.joined([sources.lamp_lights(self._maps), sources.emissive_lights(context, self.seed)])
-        world = sources.world_lights(context, self.grids[-1], self.seed, progress.span(0.0, 0.2))
-        volumes: list[np.ndarray] = []
-        injected = 0.0
-        for level in reversed(range(len(self.grids))):
-            grid, coarser = self.grids[level], self.grids[level + 1:]
-            crossing = _crossing(grid, coarser, tuple(volumes)) if coarser else world
-            rows = sources.joined([lights, crossing])
+        propagated: list[np.ndarray] = []
+        seen: list[np.ndarray] = []
+        for level in reversed(range(count)):
+            grid, blocking, coarser = self.grids[level], self.blocking[level], self.grids[level + 1:]
+            part = progress.span((count - 1 - level) / count, (count - level) / count)
+            world = sources.world_volume(context, grid, self.seed, part.span(0.0, 0.4))
+            rows = sources.joined([lights, _crossing(grid, coarser, tuple(propagated))]) if coarser else lights
             volume = self.kernels.lpv_inject(grid, *rows)
-            if level == len(self.grids) - 1:
-                injected = total_flux(volume)
-                if len(rows.flux) and np.any(rows.flux > 0) and not np.any(injected > 0):
-                    raise BakeError("no virtual light lies inside the light propagation volumes", "raise cell_size or add cascades")
-            share = progress.span(1.0 - 0.8 * (level + 1) / len(self.grids), 1.0 - 0.8 * level / len(self.grids))
-            volumes.insert(0, self.kernels.lpv_propagate(volume, self.blocking[level], settings.steps, threads=context.threads,
-                                                         progress=share))
+            if not coarser and np.any(lights.flux > 0) and not np.any(volume[0] > 0):
+                raise BakeError("no virtual light lies inside the light propagation volumes", "raise cell_size or add cascades")
+            if world.any() and blocking.reflectance is not None:
+                volume = volume + self._reflected(world, blocking)
+            propagated.insert(0, self.kernels.lpv_propagate(volume, blocking, self.settings.steps, threads=context.threads,
+                                                            progress=part.span(0.4, 1.0)))
+            seen.insert(0, world)
+        volumes = tuple(volume + world for volume, world in zip(propagated, seen, strict=True))
         stats = {"rays": 0, "virtual_lights": len(lights.flux), "cells": sum(grid.count for grid in self.grids),
-                 "injected_flux": [float(value) for value in injected]}
-        return LpvField(self.grids, tuple(volumes), params=asdict(settings), stats=stats, resampled=self._resample,
+                 "injected_flux": [float(value) for value in lights.flux.sum(axis=0, dtype=np.float64)]}
+        return LpvField(self.grids, volumes, params=asdict(self.settings), stats=stats, resampled=self._resample,
                         relit=self.relight, kernels=self.kernels)
+
+    def _reflected(self, world: np.ndarray, blocking: Blocking) -> np.ndarray:
+        """What surfaces send back of the world's light: a step through faces that let nothing through."""
+        closed = replace(blocking, through=np.zeros_like(blocking.through))
+        return self.kernels.lpv_propagate(world, closed, 1, threads=self.context.threads) - world
 
     def _resample(self, field: LpvField):
         order = self.settings.order

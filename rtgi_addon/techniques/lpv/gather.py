@@ -87,6 +87,13 @@ def sample(grid: LpvGrid, flat: np.ndarray, points: np.ndarray, planes: np.ndarr
     return np.einsum("nk,nkc->nc", weights, flat[indices]).reshape(-1, 4, 3)
 
 
+def intensity_of_radiance(grid: LpvGrid) -> np.ndarray:
+    """Factors (4,) float32 that take SH coefficients of incident radiance to those of a cell's intensity."""
+    factors = np.full(4, -2.0 * pi / (3.0 * FACE_AHEAD) * grid.cell**2, np.float32)
+    factors[0] = pi / FACE_TOTAL * grid.cell**2
+    return factors
+
+
 def radiance_sh(grids: tuple[LpvGrid, ...], volumes: tuple[np.ndarray, ...], points: np.ndarray, order: int) -> np.ndarray:
     """SH coefficients (n, (order + 1)^2, 3) float32 of incident radiance at free ``points`` (n, 3); bands above 1 are 0."""
     points = np.asarray(points, np.float64)
@@ -95,7 +102,6 @@ def radiance_sh(grids: tuple[LpvGrid, ...], volumes: tuple[np.ndarray, ...], poi
     for grid, volume, weight in zip(grids, volumes, share.T, strict=True):
         rows = np.flatnonzero(weight)
         if rows.size:
-            coefficients = sample(grid, interleaved(volume), points[rows]) * (weight[rows, None, None] / np.float32(grid.cell**2))
-            result[rows, 0] += np.float32(FACE_TOTAL / pi) * coefficients[:, 0]
-            result[rows, 1:4] -= np.float32(1.5 * FACE_AHEAD / pi) * coefficients[:, 1:]
+            coefficients = sample(grid, interleaved(volume), points[rows]) / intensity_of_radiance(grid)[:, None]
+            result[rows, :4] += weight[rows, None, None] * coefficients
     return result[:, : sh.coefficient_count(order)]

@@ -21,7 +21,7 @@ class LpvSettings:
     center: str = setting("volumes", "Center", "What the cascades are centred on: 'volumes', 'camera' or the name of an object")
     steps: int = setting(256, "Steps", "How often light moves on by one cell; games use 8, a room needs many times its cells",
                          "", 1, 4096)
-    bounces: bool = setting(True, "Further Bounces", "Reflect light that meets geometry while it is propagated")
+    further_bounces: bool = setting(True, "Further Bounces", "Reflect light that meets geometry while it is propagated")
     blocking: bool = setting(True, "Blocking", "Let geometry stop light between cells")
     occluders: str = setting("surfaces", "Occluders", "Geometry that blocks: all surfaces in the volume, or only what lamps and "
                              "cameras see of it", choices=("surfaces", "views"))

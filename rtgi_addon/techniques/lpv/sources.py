@@ -1,21 +1,25 @@
-"""The light that enters a light propagation volume: what lamps light first, emissive surfaces, and what crosses its border."""
+"""The light that enters a light propagation volume: what lamps light first, emissive surfaces, the world, a coarser cascade."""
 
 from typing import NamedTuple
 
 import numpy as np
 
 from ...errors import BakeError
-from ...numerics.sampling import cosine_hemisphere, frame, hash_u32, r2, sobol_owen
+from ...numerics import sh
+from ...numerics.grid import lattice_points
+from ...numerics.sampling import fibonacci_sphere, r2, sobol_owen
 from ...progress import Progress
 from ...transport.context import LightContext
-from ...transport.parallel import chunks, parallel_for
+from ...transport.parallel import CHUNK, chunks, parallel_for
 from ...transport.reflective_shadow_map import ReflectiveShadowMap
 from ...transport.shadow_views import views_of
-from .gather import FACE_TOTAL
+from .gather import FACE_TOTAL, intensity_of_radiance
 from .grid import FRONT_SOLID_ANGLE, SIDE_SOLID_ANGLE, LpvGrid
 
-# Points on emissive surfaces, and rays to the world through each face of the border.
-EMITTER_POINTS, WORLD_RAYS = 1 << 15, 64
+# Texels of all shadow maps together: with very many lamps each gets smaller ones.
+MAX_TEXELS, MIN_RESOLUTION = 1 << 21, 16
+# Points on emissive surfaces, and rays from each cell to the world and to its bright patches.
+EMITTER_POINTS, WORLD_RAYS, BRIGHT_RAYS = 1 << 15, 96, 32
 
 
 class Lights(NamedTuple):
@@ -28,9 +32,11 @@ class Lights(NamedTuple):
 
 def capture_maps(context: LightContext, kernels, grids: tuple[LpvGrid, ...], resolution: int,
                  progress: Progress) -> list[ReflectiveShadowMap]:
-    """The reflective shadow maps of every lamp; a sun's is fitted to the coarsest volume.
+    """The reflective shadow maps of every lamp, ``resolution`` texels a side or fewer if they are many; a sun's is fitted to the
+    coarsest volume.
 
-    Raises BakeError naming a lamp that lights surfaces, but none within the volumes.
+    Raises BakeError naming a lamp that lights surfaces, but none within the volumes, and if no lamp lights any and nothing else
+    shines.
     """
     outermost = grids[-1]
     box = np.stack([np.asarray(outermost.corner) - outermost.cell, outermost.high + outermost.cell])
@@ -38,6 +44,8 @@ def capture_maps(context: LightContext, kernels, grids: tuple[LpvGrid, ...], res
     focus = np.stack([np.maximum(box[0], bounds[0]), np.minimum(box[1], bounds[1])])
     if np.any(focus[0] > focus[1]):
         focus = box
+    count = sum(len(views_of(context, lamp, resolution, focus=focus)) for lamp in range(context.lamps.count))
+    resolution = int(np.clip(np.sqrt(MAX_TEXELS / max(count, 1)), min(resolution, MIN_RESOLUTION), resolution))
     maps = []
     for lamp in range(context.lamps.count):
         progress.step(lamp / context.lamps.count, "capturing reflective shadow maps")
@@ -48,6 +56,9 @@ def capture_maps(context: LightContext, kernels, grids: tuple[LpvGrid, ...], res
             raise BakeError(f"lamp {name!r} lights nothing inside the light propagation volumes",
                             "add cascades, raise cell_size, or hide the lamp from renders")
         maps += own
+    dark = context.environment.is_black and not context.emitters.count
+    if maps and dark and not any(np.any(captured.primitive >= 0) for captured in maps):
+        raise BakeError("no lamp lights any surface", "turn a lamp towards the scene, or add light")
     return maps
 
 
@@ -65,42 +76,32 @@ def emissive_lights(context: LightContext, seed: int, count: int = EMITTER_POINT
     return Lights(np.concatenate([positions, positions]), np.concatenate([normals, -normals]), np.concatenate([flux, flux]))
 
 
-def world_lights(context: LightContext, grid: LpvGrid, seed: int, progress: Progress) -> Lights:
-    """The world as it shines in through the faces of ``grid``'s border, past whatever surfaces stand outside."""
-    positions, inward = border(grid)
+def world_volume(context: LightContext, grid: LpvGrid, seed: int, progress: Progress) -> np.ndarray:
+    """The world as each cell's centre sees it past the surfaces, as coefficients (4, 3, nz, ny, nx) float32 of intensity.
+
+    It is traced, not propagated: what comes from far away in a straight line is what cells spread most.
+    """
+    volume = grid.empty()
     if context.environment.is_black:
-        return joined([])
-    spans = chunks(len(positions), 1024)
-    points = cosine_hemisphere(r2(WORLD_RAYS, seed))
+        return volume
+    centers = lattice_points(grid.world_from_local, grid.resolution).reshape(-1, 3).astype(np.float32)
+    directions = fibonacci_sphere(WORLD_RAYS).astype(np.float32)
+    radiance = context.environment.base_radiance(directions) * np.float32(4.0 * np.pi / WORLD_RAYS)
+    if context.environment.bright.count:
+        spots, weights = context.environment.bright.sample(r2(BRIGHT_RAYS, seed))
+        directions = np.concatenate([directions, spots])
+        radiance = np.concatenate([radiance, weights / np.float32(BRIGHT_RAYS)])
+    projected = sh.evaluate(directions, 1)[:, :, None] * radiance[:, None]
+    projected = (intensity_of_radiance(grid)[:, None] * projected).reshape(len(directions), 12)
+    spans = chunks(len(centers), CHUNK // len(directions))
 
     def work(i):
-        p, n = positions[spans[i]], -inward[spans[i]]
-        tangent, bitangent = frame(n)
-        local = points[None]
-        directions = (local[..., 0:1] * tangent[:, None] + local[..., 1:2] * bitangent[:, None] + local[..., 2:3] * n[:, None])
-        directions = np.ascontiguousarray(directions.reshape(-1, 3), np.float32)
-        free = ~context.tracer.occluded(np.repeat(p, WORLD_RAYS, axis=0), directions)
-        radiance = np.zeros((len(directions), 3), np.float32)
-        radiance[free] = context.environment.base_radiance(directions[free])
-        mean = radiance.reshape(len(p), WORLD_RAYS, 3).mean(axis=1)
-        return mean * np.float32(np.pi) + _bright(context, p, n, hash_u32(seed, i))
+        origins = np.repeat(centers[spans[i]], len(directions), axis=0)
+        free = ~context.tracer.occluded(origins, np.tile(directions, (len(centers[spans[i]]), 1)))
+        return np.einsum("nd,dk->nk", free.reshape(-1, len(directions)).astype(np.float32), projected)
 
-    irradiance = np.concatenate(parallel_for(work, len(spans), context.threads, progress, "light of the world"))
-    return entering(grid, positions, inward, irradiance * np.float32(grid.cell**2))
-
-
-def _bright(context, points, normals, seed) -> np.ndarray:
-    """Irradiance (n, 3) that the world's bright patches give facing planes at ``points`` with ``normals``."""
-    bright = context.environment.bright
-    result = np.zeros((len(points), 3), np.float32)
-    if not bright.count:
-        return result
-    directions, radiance = bright.sample(r2(WORLD_RAYS, int(seed)))
-    for direction, weight in zip(directions, radiance, strict=True):
-        rows = np.flatnonzero(normals @ direction > 0)
-        free = rows[~context.tracer.occluded(points[rows], np.repeat(direction[None], len(rows), axis=0))]
-        result[free] += weight * (normals[free] @ direction)[:, None] / np.float32(WORLD_RAYS)
-    return result
+    parts = parallel_for(work, len(spans), context.threads, progress, "light of the world")
+    return np.ascontiguousarray(np.concatenate(parts).T).reshape(volume.shape)
 
 
 def border(grid: LpvGrid) -> tuple[np.ndarray, np.ndarray]:
