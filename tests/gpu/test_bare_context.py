@@ -1,0 +1,80 @@
+"""The same GLSL files in a bare OpenGL context, where moderngl is installed: they compile, and propagate as numpy does."""
+
+import ctypes
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+moderngl = pytest.importorskip("moderngl", reason="moderngl is not installed: it is for benchmarks")
+
+from benchmarks.bare_gl import BareContext  # noqa: E402
+from rtgi_addon.preview import programs  # noqa: E402
+from rtgi_addon.preview.atlas import Atlas  # noqa: E402
+from rtgi_addon.preview.packing import FLUX_SCALE, face_blocks  # noqa: E402
+from rtgi_addon.preview.program import Program  # noqa: E402
+from rtgi_addon.techniques.lpv.geometry_volume import Surfels, face_blocking, inject_surfels  # noqa: E402
+from rtgi_addon.techniques.lpv.grid import SIDE_AHEAD, LpvGrid  # noqa: E402
+from rtgi_addon.techniques.lpv.propagation import propagate  # noqa: E402
+
+PROGRAMS = [value for value in vars(programs).values() if isinstance(value, Program)]
+CHANNELS = ("red", "green", "blue")
+
+
+@contextmanager
+def current_context_kept():
+    """Blender goes on working in whatever EGL context is current: give it back its own."""
+    try:
+        egl = ctypes.CDLL("libEGL.so.1")
+    except OSError:
+        yield
+        return
+    for name in ("eglGetCurrentDisplay", "eglGetCurrentSurface", "eglGetCurrentContext"):
+        getattr(egl, name).restype = ctypes.c_void_p
+    draw, read = (egl.eglGetCurrentSurface(which) for which in (0x3059, 0x305A))
+    before = egl.eglGetCurrentDisplay(), draw, read, egl.eglGetCurrentContext()
+    try:
+        yield
+    finally:
+        if before[0]:
+            egl.eglMakeCurrent(*map(ctypes.c_void_p, before))
+
+
+@pytest.fixture(scope="module")
+def bare():
+    with current_context_kept():
+        try:
+            context = BareContext()
+        except Exception as error:
+            pytest.skip(f"no bare OpenGL context: {error}")
+        yield context
+
+
+@pytest.mark.parametrize("program", [*PROGRAMS, *(programs.surface_program(name, 2, 1, smooth) for name in programs.SURFACE_PASSES
+                                                  for smooth in (False, True))], ids=lambda program: program.name)
+def test_every_program_compiles(bare, program):
+    assert bare.build(program) is bare.build(program)
+
+
+def test_one_step_of_light_is_numpys(bare):
+    rng = np.random.default_rng(0)
+    grid = LpvGrid((0.0, 0.0, 0.0), 1.0, (6, 5, 7))
+    normals = rng.normal(size=(200, 3))
+    surfels = Surfels(rng.random((200, 3)) * grid.resolution, normals / np.linalg.norm(normals, axis=1, keepdims=True),
+                      rng.random(200), rng.random((200, 3)))
+    blocking, coefficients = face_blocking(inject_surfels(grid, surfels)), rng.normal(size=(4, 3, 7, 5, 6)).astype(np.float32)
+    atlas = Atlas.of(grid.resolution)
+    faces, blockers = (bare.upload(texels) for texels in face_blocks(atlas, blocking))
+    light = [bare.upload(atlas.pack(np.moveaxis(coefficients[:, channel], 0, -1) * FLUX_SCALE)) for channel in range(3)]
+    following, total = ([bare.empty(*atlas.size) for _ in CHANNELS] for _ in range(2))
+    bare.dispatch(
+        programs.LPV_PROPAGATE, atlas.size,
+        uniforms={"parameters": {"resolution": grid.resolution, "columns": atlas.columns, "size": atlas.size,
+                                 "side_ahead": SIDE_AHEAD, "bounces": 1}},
+        samplers={**{f"light_{name}": light[i] for i, name in enumerate(CHANNELS)}, "faces": faces, "blockers": blockers},
+        images={f"{kind}_{name}": textures[i] for kind, textures in (("next", following), ("total", total))
+                for i, name in enumerate(CHANNELS)})
+    expected = propagate(coefficients, blocking, 1) - coefficients
+    for channel in range(3):
+        found = np.moveaxis(atlas.unpack(bare.download(total[channel])) / FLUX_SCALE, -1, 0)
+        assert np.abs(found - expected[:, channel]).max() < 1e-5 * np.abs(expected).max()
