@@ -7,6 +7,12 @@ formulas and what differs from the paper).
 What it is not: the light that it knows is one bounce of lamps. World, emissive surfaces and further bounces are not in it. The
 paper's gather has no visibility: bounced light goes through walls (set ``visibility`` for a shadow ray per sample). Lamps with a
 radius are captured from their centre, area lamps from a few points, and a texel has one normal and albedo for all it covers.
+
+Measured at default settings against the path reference, at points on surfaces of cornell_box, two_rooms, sun_window and
+corridor_door_ajar (`benchmarks/technique_errors.py`): of all indirect light it errs by 46, 63, 72 and 57 %, almost all of it the
+bounces that it lacks (bias −43, −57, −74, −52 %). Of the first bounce of lamps it errs by 17 to 22 % and is 12 to 18 % too bright,
+since nothing is in the way; the dark one of the two rooms, where the exact answer is 0, gets 14 % of the light of the lit one. With
+``visibility`` these are 6 to 15 %, within 2 % of the right sum, and exactly 0; 8,192 samples take the 6 to 15 % to 1 to 2 %.
 """
 
 import numpy as np

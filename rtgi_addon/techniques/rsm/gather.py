@@ -92,22 +92,22 @@ class GatherMap:
         depth = np.maximum(homogeneous[:, 3], 1e-6 * np.abs(homogeneous[:, :2]).max(axis=1) + 1e-30)
         return np.clip(0.5 + 0.5 * homogeneous[:, :2] / depth[:, None], 0.0, 1.0).astype(np.float32)
 
-    def by_flux(self, xi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Texels (n, s) that follow the flux, and places within them (n, s, 2) float32 in the unit square.
+    def by_flux(self, across: np.ndarray, up: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
+        """Texels (n, s) that follow the flux, and places within them, x and y (n, s) float32 in the unit square.
 
-        ``xi`` (n, s, 2) chooses a row by what it holds, then a texel of it: the points' evenness in two dimensions is kept.
+        ``up`` (n, s) chooses a row by what it holds, ``across`` a texel of it: the points' evenness in two dimensions is kept.
         """
         size, last = self.view.resolution, self.cumulative[self.view.resolution - 1::self.view.resolution]
-        target = xi[..., 1].astype(np.float64) * last[-1]
+        target = up.astype(np.float64) * last[-1]
         row = np.searchsorted(last, target, side="right")
         low = np.where(row > 0, last[row - 1], 0)
         total = last[row] - low
         v = row + (target - low) / total
-        target = low + xi[..., 0].astype(np.float64) * total
+        target = low + across.astype(np.float64) * total
         index = np.searchsorted(self.cumulative, target, side="right")
         low = np.where(index > 0, self.cumulative[index - 1], 0)
         u = index - row * size + (target - low) / (self.cumulative[index] - low)
-        return index, (np.stack([u, v], axis=-1) / size).astype(np.float32)
+        return index, ((u / size).astype(np.float32), (v / size).astype(np.float32))
 
     def _areas(self) -> np.ndarray:
         """Surface (texels,) [m²] that each texel covers."""
@@ -213,29 +213,34 @@ def _sample(item: GatherMap, points: np.ndarray, pattern: Pattern) -> tuple[np.n
     size, radius = item.view.resolution, np.float32(pattern.disk_radius)
     disk_xi, flux_xi = item.places(pattern)
     in_disk, by_flux = len(disk_xi), len(flux_xi)
-    centre = item.centres(points)[:, None]
-    shift = rotations(points, pattern.seed)[:, None]
+    centre, shift = item.centres(points), rotations(points, pattern.seed)
     places, indices = [], []
     if in_disk:
-        xi = np.mod(disk_xi[None] + shift, np.float32(1.0))
-        angle = xi[..., 1] * np.float32(2.0 * np.pi)
-        reach = (radius * xi[..., 0] * np.sqrt(xi[..., 0]))[..., None]
-        place = centre + reach * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-        texel = np.floor(place * size).astype(np.int32)
-        inside = np.all((texel >= 0) & (texel < size), axis=-1)
+        xi = _turned(disk_xi, shift)
+        angle, reach = xi[1] * np.float32(2.0 * np.pi), radius * xi[0] * np.sqrt(xi[0])
+        place = centre[:, :1] + reach * np.cos(angle), centre[:, 1:] + reach * np.sin(angle)
+        column, row = (np.floor(part * size).astype(np.int32) for part in place)
+        # Negative numbers are large as unsigned ones.
+        inside = (column.view(np.uint32) < size) & (row.view(np.uint32) < size)
         places.append(place)
-        indices.append(np.where(inside, texel[..., 1] * size + texel[..., 0], -1))
+        indices.append(np.where(inside, row * size + column, -1))
     if by_flux:
-        xi = np.mod(flux_xi[None] + shift, np.float32(1.0))
-        index, place = item.by_flux(xi)
+        index, place = item.by_flux(*_turned(flux_xi, shift))
         places.append(place)
         indices.append(index)
-    place, index = np.concatenate(places, axis=1), np.concatenate(indices, axis=1)
+    index = np.concatenate(indices, axis=1)
+    x, y = (np.concatenate(parts, axis=1) - middle for parts, middle in zip(zip(*places, strict=True), np.hsplit(centre, 2),
+                                                                           strict=True))
     texels = np.take(item.rows, np.maximum(index, 0), axis=0)
-    squared = np.sum(np.square((place - centre) / radius), axis=-1)
-    disk = np.where(squared < 1, np.maximum(squared, np.float32(1e-12)) ** np.float32(-2.0 / 3.0), np.float32(0.0))
+    squared = (x * x + y * y) / (radius * radius)
+    disk = (squared < 1) * np.maximum(squared, np.float32(1e-12)) ** np.float32(-2.0 / 3.0)
     density = disk * np.float32(in_disk / (3.0 * np.pi * pattern.disk_radius**2)) + texels[..., 10] * np.float32(by_flux)
-    return texels, np.where((index >= 0) & (density > 0), np.float32(size * size) / np.maximum(density, 1e-30), np.float32(0.0))
+    return texels, ((index >= 0) & (density > 0)) * (np.float32(size * size) / np.maximum(density, np.float32(1e-30)))
+
+
+def _turned(places: np.ndarray, shift: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Both coordinates (n, s) of the pattern's points (s, 2) after each receiver's ``shift`` (n, 2) on the torus."""
+    return tuple(sums - np.floor(sums) for sums in (places[None, :, d] + shift[:, d, None] for d in range(2)))
 
 
 def _arrival(texels, points):
