@@ -166,3 +166,27 @@ def test_no_light_is_darkness_and_cancel_stops():
     progress.cancel()
     with pytest.raises(Cancelled):
         techniques.get("lpv").bake(build.closed_box(), LpvSettings(**QUICK), np.random.default_rng(0), progress)
+
+
+def test_a_lamp_that_creeps_does_not_flicker():
+    points, normals = walls(60)
+    frames = []
+    for step in range(6):
+        field = bake(build.closed_box(light_position=(0.11 + 0.002 * step, 0.03, 0.07)))
+        frames.append(field.irradiance(points, normals)[:, 0])
+    frames = np.array(frames)
+    # A lamp that moves by a hundredth of a cell a frame changes the light by about as much.
+    assert np.abs(np.diff(frames, axis=0)).mean() < 0.02 * frames.mean()
+
+
+def test_a_turned_wall_keeps_most_light_out():
+    # A wall through the room under 30 degrees, wherever the lattice lies.
+    direction = np.array([np.sin(np.pi / 6), np.cos(np.pi / 6), 0.0])
+    corner = -3 * direction - [0, 0, 3]
+    wall = rooms.quad("wall", corner, 6 * direction, (0, 0, 6), 0)
+    scene = build.scene([build.cube("room", 1.0, inward=True), wall], [build.material("grey", 0.5)],
+                        [build.point_light((0.6, -0.3, 0.2))])
+    field = bake(scene, resolution=20, steps=150)
+    floor = np.array([[0.55, -0.4, -1.0], [-0.55, 0.4, -1.0]])
+    lit, dark = field.irradiance(floor, np.tile([0.0, 0, 1], (2, 1)))[:, 0]
+    assert dark < 0.25 * lit

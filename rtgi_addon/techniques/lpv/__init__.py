@@ -1,7 +1,7 @@
 """Light propagation volumes: light flows from cell to cell of a lattice.
 
 Papers: A. Kaplanyan, "Light Propagation Volumes in CryEngine 3", SIGGRAPH 2009; A. Kaplanyan and C. Dachsbacher, "Cascaded Light
-Propagation Volumes for Real-Time Indirect Illumination", I3D 2010. What lamps light first (the texels of reflective shadow maps),
+Propagation Volumes for Real-Time Indirect Illumination", I3D 2010. What lamps light first (the texels of reflective shadow maps)
 and emissive surfaces go into cells as cosine lobes in SH of order 1 (`injection`, `sources`); surfaces go into a geometry volume
 half a cell off (`surfels`, `geometry_volume`); steps carry light through the cells' faces, past or back from what blocks
 (`propagation`); the sum over steps is what is gathered (`gather`), from nested volumes (`cascades`).
@@ -17,8 +17,8 @@ reflected often (a sphere of albedo 0.9 keeps 36 %); light that surfaces outside
 spot of the sky is as soft as SH of order 1. Against the path reference, at points on surfaces, with 16 cells and 256 steps
 (benchmarks/technique_errors.py):
 
-    relative RMSE, bias    cornell_box 45 %, +15 %    two_rooms 35 %, -13 % (0.5 % of the lit room's light in the dark one)
-                           sun_window 46 %, +7 %      corridor_door_ajar 30 %, -27 %
+    relative RMSE, bias    cornell_box 45 %, +15 %    two_rooms 36 %, -15 % (0.5 % of the lit room's light in the dark one)
+                           sun_window 42 %, +3 %      corridor_door_ajar 30 %, -27 %
 
 The 8 steps of games leave out four fifths of what lamps give a room 16 cells wide; 32 cells and 256 steps have 94 % on
 cornell_box, 63 % on two_rooms. Without damping against self-lighting cornell_box has 64 %, without further bounces 56 %.

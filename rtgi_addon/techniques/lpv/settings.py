@@ -14,7 +14,7 @@ class LpvSettings:
 
     order: int = setting(1, "SH Order", "Highest band of the exported probes; the volumes themselves hold order 1", "", 0, 2)
     resolution: int = setting(16, "Resolution", "Cells along each side of every cascade; light spreads with every cell it "
-                              "passes, so finer ones are not always more exact", "", 4, 512)
+                              "passes, so finer ones are not always more exact", "", 4, 4096)
     cascades: int = setting(1, "Cascades", "Nested volumes of the same resolution, each with cells twice as large", "", 1, 8)
     cell_size: float | None = setting(None, "Cell Size", "Side of the finest cascade's cells; unset fits that cascade around the "
                                       "probe volumes and the room they stand in", "m", 1e-6, 1e6)
