@@ -8,7 +8,7 @@ intensity goes against.
 
 A surface is given the light of the second cell in front of it. The first one holds what the surface itself sends out, a lobe
 whose order-1 SH sends -13.8 % backwards, into its own surface. Light that spread back from there is damped by the directional
-derivative of Kaplanyan and Dachsbacher 2010, section 6: where irradiance falls off with height, the surface lights itself.
+derivative of Kaplanyan and Dachsbacher 2010: where irradiance falls off with height, the surface lights itself.
 """
 
 from math import pi

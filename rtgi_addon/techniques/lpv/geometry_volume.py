@@ -1,6 +1,6 @@
 """The geometry volume: how much surface stands in the way of light between cells, which way it faces and what it reflects.
 
-Kaplanyan and Dachsbacher 2010, section 5: surface elements (surfels) are gathered in a lattice half a cell off that of the
+Kaplanyan and Dachsbacher 2010: surface elements (surfels) are gathered in a lattice half a cell off that of the
 light, so that its samples are the corners of the light's cells. On the way w through a face with normal f light is blocked with
 chance B(w) = sum of A·|n·w| / (s^2·|f·w|), at most 1, interpolated from the face's four corners: the share of the face's own
 cross-section that surfaces cover. The paper takes the sum from a clamped lobe in SH of order 1 per corner, which lets a quarter

@@ -22,7 +22,7 @@ def _square_solid_angle(distance: float, half: float = 0.5) -> float:
 
 
 # From a cell's centre: a neighbour's far face, and each of its four side faces. The five fill the face in between, a sixth of
-# the sphere. Kaplanyan and Dachsbacher 2010, section 4.
+# the sphere. Kaplanyan and Dachsbacher 2010.
 FRONT_SOLID_ANGLE = _square_solid_angle(1.5)
 SIDE_SOLID_ANGLE = (_square_solid_angle(0.5) - FRONT_SOLID_ANGLE) / 4.0
 # Cosines of the direction to a side face's centre with the way to the neighbour and with that face's normal.

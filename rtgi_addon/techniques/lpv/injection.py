@@ -7,7 +7,7 @@ from .grid import LINEAR, PER_FLUX, PER_VECTOR, LpvGrid
 
 def inject(grid: LpvGrid, positions: np.ndarray, normals: np.ndarray, flux: np.ndarray) -> np.ndarray:
     """Coefficients (4, 3, nz, ny, nx) float32 of lights at ``positions`` (n, 3) that send ``flux`` (n, 3) [W] about ``normals``
-    (n, 3) with I = flux/pi · cosine (Kaplanyan and Dachsbacher 2010, section 3).
+    (n, 3) with I = flux/pi · cosine (Kaplanyan and Dachsbacher 2010).
 
     A light is moved by half a cell along its normal first, into the cell in front of its surface. What then lies outside
     the volume is left out. Sums are in float64.

@@ -1,6 +1,6 @@
 """Light from cell to cell: every step takes each cell's intensity through its six faces into the neighbours.
 
-Kaplanyan and Dachsbacher 2010, section 4: through the face f of a neighbour, seen from a cell's centre under the solid angle
+Kaplanyan and Dachsbacher 2010: through the face f of a neighbour, seen from a cell's centre under the solid angle
 W_f in direction w_f, goes the flux W_f·I(w_f)·(1 - B(w_f)); the neighbour sends it on as a cosine lobe towards f. What is
 blocked is reflected by the blocker's albedo, as a lobe about its normal, from the cell that it came from.
 
