@@ -13,7 +13,7 @@ from ..scene import AreaLight, Light, PointLight, SpotLight, SunLight
 from .lamps import spot_attenuation
 
 # Faces of a cube, in the order of graphics APIs, and for each an up vector that is not parallel to it.
-CUBE_AXES = np.array([(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)], np.float64)
+_CUBE_AXES = np.array([(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)], np.float64)
 _CUBE_UPS = np.array([(0, 0, 1)] * 4 + [(0, 1, 0)] * 2, np.float64)
 # A cone wider than this half tangent is cut into the faces of a cube: a single frustum would spend its texels on the rim.
 MAX_TANGENT = 2.0
@@ -77,10 +77,11 @@ class ShadowView:
         return np.diff(np.diff(corner, axis=0), axis=1)
 
     def project(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Map coordinates (n, 2) of world ``points`` (n, 3), [0, 1] inside the map, and which of them lie in front (n,) bool."""
+        """Map coordinates (n, 2) of world ``points`` (n, 3), [0, 1] inside the map, and which of them lie in front (n,) bool; those
+        behind a pinhole come out far beyond the edge on their side."""
         clip = np.asarray(points, np.float64) @ self.clip_from_world[:, :3].T + self.clip_from_world[:, 3]
-        front = clip[:, 3] > 0
-        return 0.5 + 0.5 * clip[:, :2] / np.where(front, clip[:, 3], 1.0)[:, None], front
+        depth = np.maximum(clip[:, 3], 1e-6 * np.abs(clip[:, :2]).max(axis=1) + 1e-30)
+        return 0.5 + 0.5 * clip[:, :2] / depth[:, None], clip[:, 3] > 0
 
     def _fan(self) -> np.ndarray:
         """From the eye to the texels' centres at depth 1 (n, 3) float64, world axes, row by row."""
@@ -171,7 +172,7 @@ def _point_views(position, bounds: np.ndarray):
 
 
 def _cube_views(position, bounds: np.ndarray):
-    return [_pinhole(_look_along(axis, up), position, bounds) for axis, up in zip(CUBE_AXES, _CUBE_UPS, strict=True)]
+    return [_pinhole(_look_along(axis, up), position, bounds) for axis, up in zip(_CUBE_AXES, _CUBE_UPS, strict=True)]
 
 
 def _spot_views(light: SpotLight, bounds: np.ndarray):

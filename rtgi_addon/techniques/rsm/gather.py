@@ -87,10 +87,7 @@ class GatherMap:
 
     def centres(self, points: np.ndarray) -> np.ndarray:
         """Where receivers (n, 3) project into the unit square (n, 2) float32: the nearest point of it for those outside."""
-        homogeneous = np.asarray(points, np.float64) @ self.view.clip_from_world[:, :3].T + self.view.clip_from_world[:, 3]
-        # Behind the pinhole the same formula, with a depth that is just not zero, leads to the edge on the receiver's side.
-        depth = np.maximum(homogeneous[:, 3], 1e-6 * np.abs(homogeneous[:, :2]).max(axis=1) + 1e-30)
-        return np.clip(0.5 + 0.5 * homogeneous[:, :2] / depth[:, None], 0.0, 1.0).astype(np.float32)
+        return np.clip(self.view.project(points)[0], 0.0, 1.0).astype(np.float32)
 
     def by_flux(self, across: np.ndarray, up: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
         """Texels (n, s) that follow the flux, and places within them, x and y (n, s) float32 in the unit square.
