@@ -95,7 +95,11 @@ def connect(light: Light, points: np.ndarray, u: np.ndarray, beam: Beam):
         directions = normalized(points - origins)
         return origins, directions, _area_domain(light, directions), _area_shines(light, origins, points)
     centre = np.asarray(light.position_world, np.float32)
-    directions = normalized(points - _beside(light, normalized(points - centre), u))
+    directions = normalized(points - centre)
+    if light.radius > 0:
+        # The place on the lamp turns with the direction; a few steps settle both.
+        for _ in range(4):
+            directions = normalized(points - _beside(light, directions, u))
     origins = _beside(light, directions, u)
     shines = np.ones(len(points), bool)
     if isinstance(light, SpotLight):

@@ -188,8 +188,12 @@ def trace(context: LightContext, light: Light, lamp: int, emission, u: np.ndarra
         met = np.flatnonzero(parts[-1].met)
         if met.size == 0:
             break
-        normals, rows = parts[-1].first_normal[met], rows[met]
-        origins = offset_origins(parts[-1].first[met], normals, emission.directions[rows])
+        first, normals, rows = parts[-1].first[met], parts[-1].first_normal[met], rows[met]
+        reach = np.abs(first - origins[met]).max(axis=1)
+        # Once back onto the surface that the point was moved off, and once through it.
+        for _ in range(2):
+            first = offset_origins(first, normals, emission.directions[rows], reach)
+        origins = first
     return _softened(join(parts), light)
 
 

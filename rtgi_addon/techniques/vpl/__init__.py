@@ -49,8 +49,9 @@ class VirtualPointLights(Technique):
         context = LightContext(scene, threads)
         progress.stage("virtual lights")
         lights = sample_lights(context, scene.volumes, settings, seed, focus(scene.volumes), progress.span(0.02, 0.2))
-        clamp = mean_bound(context, lights) if settings.clamp is None else settings.clamp or None
-        field = VplField(context, lights, settings, seed, clamp, kernels=kernels)
+        natural = mean_bound(context, lights)
+        clamp = natural if settings.clamp is None else settings.clamp or None
+        field = VplField(context, lights, settings, seed, clamp, natural, kernels=kernels)
         require_lights(field)
         if clamp is not None:
             field.stats["clamp_loss"] = clamp_loss(context, lights, clamp)

@@ -4,8 +4,8 @@ Source: T. Kollig and A. Keller, "Illumination in the Presence of Weak Singulari
 light between two surfaces is cut from every virtual light, so it is sampled from the receiver instead, where its 1/r² cancels. It
 differs from 0 only where r² < cosθ/b, so the rays are short and few of them hit anything.
 
-The radiance found at their ends is emission plus what lamps and a subset of the (bounded) virtual lights send there: the loss of
-that light itself is not compensated again, so of a loss of p some p² remains.
+The radiance found at their ends is emission plus what lamps and a subset of the virtual lights send there. That subset is bounded
+too, so that none of its lights gives more than the mean irradiance, and what this takes away is not looked for again.
 """
 
 import numpy as np
@@ -21,13 +21,17 @@ from ...transport.virtual_lights import VirtualLights
 from .gather import gather
 
 # Virtual lights asked about the light at a ray's end, and how many different subsets of them there are.
-SUBSET, SUBSETS = 128, 8
+SUBSET, SUBSETS = 512, 8
 
 
 class Compensation:
-    """Compensates a bound ``clamp`` [m⁻²] with ``rays`` short rays per receiver; ``bounces`` as in the bake."""
+    """Compensates a bound ``clamp`` [m⁻²] with ``rays`` short rays per receiver; ``bounces`` as in the bake.
 
-    def __init__(self, context: LightContext, lights: VirtualLights, clamp: float, rays: int, bounces: int | None, seed: int):
+    ``natural`` [m⁻²] is the bound at which one of ``lights`` gives the mean irradiance, None for none (see ``mean_bound``).
+    """
+
+    def __init__(self, context: LightContext, lights: VirtualLights, clamp: float, natural: float | None, rays: int,
+                 bounces: int | None, seed: int):
         self._context, self._clamp, self._rays, self._bounces, self._seed = context, np.float32(clamp), rays, bounces, seed
         # Light that arrives at a ray's end is reflected once more there.
         again = lights if bounces is None else lights.take(np.flatnonzero(lights.bounce < bounces))
@@ -35,9 +39,9 @@ class Compensation:
         self._subsets, self._subset_clamp = [], []
         for offset in range(min(stride, SUBSETS)):
             part = again.take(slice(offset * stride // min(stride, SUBSETS), None, stride))
-            gain = np.float32(again.count / max(part.count, 1))
+            gain = np.float32(max(again.count, 1) / max(part.count, 1))
             # Fewer, brighter lights have larger bright spots.
-            self._subset_clamp.append(clamp / float(gain))
+            self._subset_clamp.append(None if natural is None else natural / float(gain))
             self._subsets.append(VirtualLights(part.positions, part.normals, part.flux * gain, part.source, part.bounce, part.path,
                                                part.directions, part.irradiance))
 

@@ -30,13 +30,15 @@ MAX_VISIBILITIES = 1 << 26
 
 class VplField(Field):
     """The light of ``lights`` (a LightSet) in the scene of ``context``, with geometry terms bounded by ``clamp`` [m⁻²] (None: not
-    at all). ``relight`` follows lamps that moved."""
+    at all) and ``natural`` [m⁻²] that of ``mean_bound``. ``relight`` follows lamps that moved."""
 
     technique = "vpl"
 
-    def __init__(self, context: LightContext, lights: LightSet, settings: VplSettings, seed: int, clamp: float | None, *,
+    def __init__(self, context: LightContext, lights: LightSet, settings: VplSettings, seed: int, clamp: float | None,
+                 natural: float | None, *,
                  kernels: Kernels | None = None):
         self._context, self._set, self._settings, self._seed, self._clamp = context, lights, settings, seed, clamp
+        self._natural = natural
         self._kernels = kernels or NUMPY
         self.lights = lights.lights()
         self.includes_direct = settings.direct
@@ -46,8 +48,8 @@ class VplField(Field):
             self.stats["clamp"] = clamp
         self._compensation = None
         if clamp is not None and settings.compensation:
-            self._compensation = Compensation(context, self.lights, clamp, settings.compensation_rays, settings.bounces,
-                                              seed)
+            self._compensation = Compensation(context, self.lights, clamp, natural, settings.compensation_rays,
+                                              settings.bounces, seed)
         self._grids: tuple[ProbeGrid, ...] | None = None
 
     def irradiance(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
@@ -95,7 +97,7 @@ class VplField(Field):
         (progress or Progress()).check()
         context = self._context.relit(scene)
         lights, change = follow(self._set, self._context, context, self._settings, self._seed)
-        field = VplField(context, lights, self._settings, self._seed, self._clamp, kernels=self._kernels)
+        field = VplField(context, lights, self._settings, self._seed, self._clamp, self._natural, kernels=self._kernels)
         field.stats |= {"replaced_paths": change.replaced, "replaced_fraction": change.fraction}
         require_lights(field)
         return field

@@ -27,7 +27,7 @@ from .sampling import LightSet, added_paths, distant_lights, path_count, paths_p
 # Rays a path that a lamp's power is counted with.
 SAMPLES = 8
 # A path with less than this share of the mean power crowds its neighbours; so many of a lamp's are given up at once.
-CROWDED, GIVEN_UP = 0.2, 0.02
+CROWDED, GIVEN_UP = 0.4, 0.03
 # With fewer valid paths than this share the lamp has jumped: it is sampled afresh.
 FRESH_BELOW = 0.5
 
@@ -59,8 +59,12 @@ def follow(lights: LightSet, before: LightContext, after: LightContext, settings
         rows = np.flatnonzero(paths.source == lamp)
         if lamp < min(len(old), len(new)) and _same(old[lamp], new[lamp]):
             continue
-        moved = None
-        if lamp < min(len(old), len(new)) and rows.size and _can_follow(old[lamp], new[lamp]):
+        moved, there_before = None, lamp < min(len(old), len(new)) and rows.size
+        ratio = _recoloured(old[lamp], new[lamp]) if there_before else None
+        if ratio is not None:
+            power[rows] *= ratio
+            continue
+        if there_before and _can_follow(old[lamp], new[lamp]):
             moved = _follow_lamp(lights, rows, after, lamp, settings.bounces, seed)
         if moved is None:
             kept[rows] = False
@@ -76,8 +80,6 @@ def follow(lights: LightSet, before: LightContext, after: LightContext, settings
         kept[rows] = False
         if FROM_WORLD in fresh:
             added.append(source_paths(after, FROM_WORLD, fresh[FROM_WORLD], lights.beam, settings.bounces, own_seed))
-    if same_world and not added:
-        return replace(lights, generation=generation), Change(int(paths.met.sum()), 0)
     old_paths = replace(paths, power=power).take_paths(np.flatnonzero(kept))
     parts = [old_paths, *(added_paths(after, lights, part, own_seed) for part in added)]
     result = replace(lights, paths=join(parts), generation=generation)
@@ -133,8 +135,16 @@ def _can_follow(old: Light, new: Light) -> bool:
     return not isinstance(new, AreaLight) or (new.spread > 0 and old.shape == new.shape)
 
 
-def _same(old: Light, new: Light) -> bool:
+def _same(old: Light, new: Light, but: tuple[str, ...] = ()) -> bool:
     return type(old) is type(new) and all(np.array_equal(getattr(old, item.name), getattr(new, item.name)) for item in fields(old)
-                                          if item.name != "name")
+                                          if item.name not in ("name", *but))
+
+
+def _recoloured(old: Light, new: Light) -> np.ndarray | None:
+    """New over old strength (3,) of a lamp that changed in nothing else; None if it did, or was black in a channel."""
+    name = next(item.name for item in fields(old) if item.name in ("irradiance", "intensity", "radiance"))
+    if not _same(old, new, (name,)) or not np.all(getattr(old, name) > 0):
+        return None
+    return np.asarray(getattr(new, name) / getattr(old, name), np.float32)
 
 
