@@ -20,7 +20,9 @@ CORNELL = ROOT / "sample_blends/cornell_box.blend"
 
 def bake(out, technique, device, **environment):
     """Exit code and stderr of the module's door."""
-    pytest.importorskip("bpy", reason="needs Blender's Python module")
+    bpy = pytest.importorskip("bpy", reason="needs Blender's Python module")
+    if not getattr(bpy.app, "module", True):
+        pytest.skip("a real Blender has no module's door")
     command = [sys.executable, "-m", "rtgi_addon", CORNELL, "bake", "--technique", technique, "--device", device, "--out", out]
     ran = subprocess.run(list(map(str, command)), cwd=ROOT, env={**os.environ, **environment}, capture_output=True, text=True,
                          timeout=300, check=False)
