@@ -2,6 +2,7 @@
 
 import queue
 import threading
+import time
 import traceback
 from collections.abc import Callable
 from concurrent.futures import Future, wait
@@ -12,6 +13,8 @@ from ..progress import Progress
 
 # How long a bake waits for the main thread before it looks whether it was cancelled [s].
 _PATIENCE = 0.05
+# How long the main thread serves a bake at a time, and how long it waits for the next call [s]: the window stays alive.
+_SERVICE, _FOLLOW_UP = 0.08, 0.02
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,7 @@ class MainThreadCalls:
     def __init__(self):
         self._calls: queue.SimpleQueue[tuple[Future, Callable]] = queue.SimpleQueue()
 
-    def call(self, progress: Progress, function: Callable, *arguments, **options):
+    def call(self, progress: Progress, function: Callable, /, *arguments, **options):
         """``function``'s result, or its exception, from the main thread, which must ``serve``. Raises Cancelled once the user asks
         ``progress`` to stop, served or not."""
         if threading.current_thread() is threading.main_thread():
@@ -67,9 +70,16 @@ class MainThreadCalls:
         return future.result()
 
     def serve(self) -> None:
-        """Run all that waits. For the main thread."""
-        while not self._calls.empty():
-            future, function = self._calls.get()
+        """Run what waits, and what follows on its heels, for a moment: a bake asks again as soon as it is answered. For the main
+        thread."""
+        if self._calls.empty():
+            return
+        end = time.monotonic() + _SERVICE
+        while (left := end - time.monotonic()) > 0:
+            try:
+                future, function = self._calls.get(timeout=min(left, _FOLLOW_UP))
+            except queue.Empty:
+                return
             if not future.set_running_or_notify_cancel():
                 continue
             try:

@@ -5,6 +5,7 @@ import time
 
 import pytest
 
+from rtgi_addon.blender import worker as worker_module
 from rtgi_addon.blender.worker import BakeWorker, KernelsOnMainThread, MainThreadCalls, main_thread
 from rtgi_addon.progress import Progress
 
@@ -61,12 +62,37 @@ def test_a_cancelled_bake_asks_for_nothing_more():
 
 def test_kernels_are_reached_by_their_names():
     class Kernels:
-        def lpv_propagate(self, volume, *, steps):
+        def lpv_propagate(self, volume, *, steps, progress):
             return volume * steps
 
-    assert KernelsOnMainThread(Kernels(), Progress()).lpv_propagate(3, steps=2) == 6
+    def bake(progress):
+        return KernelsOnMainThread(Kernels(), progress).lpv_propagate(3, steps=2, progress=progress)
+
+    worker = BakeWorker(bake)
+    worker.start()
+    assert finished(worker).summary == 6
     with pytest.raises(AttributeError):
         KernelsOnMainThread(Kernels(), Progress()).magic()
+
+
+def test_one_turn_serves_many_calls_in_a_row(monkeypatch):
+    monkeypatch.setattr(worker_module, "_SERVICE", 60.0)
+    monkeypatch.setattr(worker_module, "_FOLLOW_UP", 2.0)
+    calls, asked = MainThreadCalls(), threading.Event()
+
+    def ask():
+        asked.set()
+        answers.extend(calls.call(Progress(), threading.current_thread) for _ in range(5))
+
+    answers = []
+    thread = threading.Thread(target=ask)
+    thread.start()
+    asked.wait()
+    while calls._calls.empty():
+        time.sleep(0.001)
+    calls.serve()
+    thread.join()
+    assert answers == [threading.main_thread()] * 5
 
 
 @pytest.fixture
