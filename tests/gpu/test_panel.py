@@ -85,13 +85,13 @@ def test_one_turn_serves_many_calls_in_a_row(monkeypatch):
         answers.extend(calls.call(Progress(), threading.current_thread) for _ in range(5))
 
     answers = []
-    thread = threading.Thread(target=ask)
+    thread = threading.Thread(target=ask, daemon=True)
     thread.start()
     asked.wait()
     while calls._calls.empty():
         time.sleep(0.001)
     calls.serve()
-    thread.join()
+    thread.join(10)
     assert answers == [threading.main_thread()] * 5
 
 
