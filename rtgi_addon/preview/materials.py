@@ -78,4 +78,4 @@ def _upload(texture: Texture) -> gpu.types.GPUTexture:
         rgba[..., :3] = texture.pixels
     if is_bytes:
         rgba[..., :channels if channels == 4 else 3] /= np.float32(255.0)
-    return upload(rgba, "RGBA8" if is_bytes else "RGBA32F")
+    return upload(rgba, "RGBA8" if is_bytes else "RGBA32F", f"the image {texture.name!r}")

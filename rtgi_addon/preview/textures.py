@@ -12,12 +12,12 @@ from ..errors import BakeError
 CHANNELS = {"R32F": 1, "RGBA32F": 4, "RGBA16F": 4, "RGBA8": 4}
 
 
-def upload(values: np.ndarray, format: str | None = None) -> gpu.types.GPUTexture:
+def upload(values: np.ndarray, format: str | None = None, name: str = "a texture") -> gpu.types.GPUTexture:
     """A texture from ``values`` (h, w) or (h, w, 4), row 0 at the bottom; float32 R32F or RGBA32F unless ``format`` says otherwise
-    (a normalized format takes floats from 0 to 1). Raises BakeError beyond the GPU's largest texture."""
+    (a normalized format takes floats from 0 to 1). Raises BakeError that gives its ``name`` beyond the GPU's largest texture."""
     values = np.ascontiguousarray(values, np.float32)
     height, width = values.shape[:2]
-    _require_size(width, height)
+    _require_size(width, height, name)
     format = format or ("R32F" if values.ndim == 2 else "RGBA32F")
     # The buffer is the array itself: both must live until the texture has taken it in, which is when this returns.
     return gpu.types.GPUTexture((width, height), format=format, data=gpu.types.Buffer("FLOAT", values.size, values))
@@ -42,8 +42,8 @@ def download(texture: gpu.types.GPUTexture) -> np.ndarray:
     return np.frombuffer(buffer, np.float32).reshape(shape).copy()
 
 
-def _require_size(width: int, height: int) -> None:
+def _require_size(width: int, height: int, name: str = "a texture") -> None:
     limit = gpu.capabilities.max_texture_size_get()
     if max(width, height) > limit:
-        raise BakeError(f"a texture of {width} × {height} is larger than this GPU's limit of {limit}",
+        raise BakeError(f"{name} of {width} × {height} is larger than this GPU's limit of {limit}",
                         "use a lower resolution, or --device cpu")

@@ -19,7 +19,7 @@ class Kernels(Protocol):
         """``techniques.rsm.gather.gather``: the paper's unoccluded gather, irradiance (n, 3)."""
 
     def lpv_inject(self, *arguments, **settings) -> np.ndarray:
-        """``techniques.lpv.injection.inject``: virtual lights into an SH volume (3, nz, ny, nx, 4)."""
+        """``techniques.lpv.injection.inject``: virtual lights into an SH volume (4, 3, nz, ny, nx)."""
 
     def lpv_propagate(self, *arguments, **settings) -> np.ndarray:
         """``techniques.lpv.propagation.propagate``: the accumulated volume after some steps."""

@@ -22,10 +22,12 @@ def test_a_slice_is_uploaded_as_what_it_shows(gpu_device):
 
 
 def test_a_new_texture_is_empty_and_a_huge_one_is_refused(gpu_device):
-    from rtgi_addon.preview.textures import download, empty
+    from rtgi_addon.preview.textures import download, empty, upload
     assert not download(empty(33, 17)).any()
-    with pytest.raises(BakeError, match="larger than this GPU's limit"):
+    with pytest.raises(BakeError, match="a texture of 1048576 × 4 is larger than this GPU's limit"):
         empty(1 << 20, 4)
+    with pytest.raises(BakeError, match="the image 'sky' of 1048576 × 1 is larger"):
+        upload(np.zeros((1, 1 << 20)), name="the image 'sky'")
 
 
 def test_every_member_of_a_struct_arrives(gpu_device, monkeypatch):
