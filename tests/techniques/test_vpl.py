@@ -162,7 +162,7 @@ def test_the_same_seed_gives_the_same_bytes_for_any_number_of_threads():
 
 
 def test_direct_light_is_added_on_demand():
-    scene = build.integrating_sphere(0.5, np.pi)
+    scene = build.integrating_sphere(0.5, np.pi, subdivisions=3)
     points, normals = on_walls(scene, 32)
     field = bake(scene, direct=True)
     assert field.includes_direct
