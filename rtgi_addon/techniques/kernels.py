@@ -15,16 +15,17 @@ class Kernels(Protocol):
     def capture(self, context, view):
         """``transport.reflective_shadow_map.capture``: what the lamp of a ShadowView sees, as a ReflectiveShadowMap."""
 
-    def rsm_gather(self, *arguments, **settings) -> np.ndarray:
+    def rsm_gather(self, maps, points: np.ndarray, normals: np.ndarray, pattern) -> np.ndarray:
         """``techniques.rsm.gather.gather``: the paper's unoccluded gather, irradiance (n, 3)."""
 
-    def lpv_inject(self, *arguments, **settings) -> np.ndarray:
+    def lpv_inject(self, grid, positions: np.ndarray, normals: np.ndarray, flux: np.ndarray) -> np.ndarray:
         """``techniques.lpv.injection.inject``: virtual lights into an SH volume (4, 3, nz, ny, nx)."""
 
-    def lpv_propagate(self, *arguments, **settings) -> np.ndarray:
+    def lpv_propagate(self, coefficients: np.ndarray, blocking, steps: int, *, threads: int | None = None,
+                      progress=None) -> np.ndarray:
         """``techniques.lpv.propagation.propagate``: the accumulated volume after some steps."""
 
-    def lpv_gather(self, *arguments, **settings) -> np.ndarray:
+    def lpv_gather(self, grids, volumes, points: np.ndarray, normals: np.ndarray, dampening: bool = True) -> np.ndarray:
         """``techniques.lpv.gather.gather``: irradiance (n, 3) from accumulated volumes."""
 
     def vpl_gather(self, lights, points: np.ndarray, normals: np.ndarray, visibility: np.ndarray | None,
@@ -40,25 +41,26 @@ class NumpyKernels:
         from ..transport.reflective_shadow_map import capture
         return capture(context, view)
 
-    def rsm_gather(self, *arguments, **settings) -> np.ndarray:
+    def rsm_gather(self, maps, points: np.ndarray, normals: np.ndarray, pattern) -> np.ndarray:
         """See Kernels."""
         from .rsm.gather import gather
-        return gather(*arguments, **settings)
+        return gather(maps, points, normals, pattern)
 
-    def lpv_inject(self, *arguments, **settings) -> np.ndarray:
+    def lpv_inject(self, grid, positions: np.ndarray, normals: np.ndarray, flux: np.ndarray) -> np.ndarray:
         """See Kernels."""
         from .lpv.injection import inject
-        return inject(*arguments, **settings)
+        return inject(grid, positions, normals, flux)
 
-    def lpv_propagate(self, *arguments, **settings) -> np.ndarray:
+    def lpv_propagate(self, coefficients: np.ndarray, blocking, steps: int, *, threads: int | None = None,
+                      progress=None) -> np.ndarray:
         """See Kernels."""
         from .lpv.propagation import propagate
-        return propagate(*arguments, **settings)
+        return propagate(coefficients, blocking, steps, threads=threads, progress=progress)
 
-    def lpv_gather(self, *arguments, **settings) -> np.ndarray:
+    def lpv_gather(self, grids, volumes, points: np.ndarray, normals: np.ndarray, dampening: bool = True) -> np.ndarray:
         """See Kernels."""
         from .lpv.gather import gather
-        return gather(*arguments, **settings)
+        return gather(grids, volumes, points, normals, dampening)
 
     def vpl_gather(self, lights, points, normals, visibility, clamp) -> np.ndarray:
         """See Kernels."""
