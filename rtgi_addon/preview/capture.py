@@ -21,7 +21,7 @@ _passes: WeakKeyDictionary = WeakKeyDictionary()
 def capture(context, view: ShadowView) -> ReflectiveShadowMap:
     """Fill ``view`` by drawing the scene."""
     if context.geometry not in _passes:
-        _passes[context.geometry] = SurfacePass(context.scene, context.geometry, "rsm_capture")
+        _passes[context.geometry] = SurfacePass(context.scene, "rsm_capture")
     size = view.resolution
     power = np.ones((size, size, 4), np.float32)
     power[..., :3] = texel_power(context.scene.lights[view.lamp], view)

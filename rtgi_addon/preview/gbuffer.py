@@ -3,7 +3,6 @@
 import gpu
 
 from ..scene import Scene
-from ..transport.geometry import Geometry
 from .device import RenderTarget
 from .materials import Images
 from .programs import SURFACE_PASSES
@@ -17,7 +16,7 @@ class GBuffer:
 
     ``textures`` by name, all RGBA32F, zero where nothing is seen: ``position`` world and ``normal`` world on the side that is seen,
     with the triangle in their fourth components (`surfaces.decode_primitive`); ``albedo`` of diffuse transport and the instance's
-    index; ``base_color`` and metallic; ``emission`` [W·sr⁻¹·m⁻²] and roughness.
+    index; ``base_color`` and metallic; ``emission`` [W·sr⁻¹·m⁻²] and roughness; ``geometry`` the triangle's own normal on that side.
     """
 
     def __init__(self, width: int, height: int):
@@ -34,6 +33,6 @@ class GBuffer:
             surfaces.draw(view, cull=True)
 
 
-def gbuffer_surfaces(scene: Scene, geometry: Geometry, images: Images | None = None) -> SurfacePass:
-    """``scene`` ready to be drawn into G-buffers; ``images`` may be shared with other passes."""
-    return SurfacePass(scene, geometry, "gbuffer", images)
+def gbuffer_surfaces(scene: Scene, images: Images | None = None) -> SurfacePass:
+    """``scene`` ready to be drawn into G-buffers and shadow maps; ``images`` may be shared with other passes."""
+    return SurfacePass(scene, "gbuffer", images)

@@ -17,12 +17,14 @@ MATERIAL = UniformStruct("MaterialInputs", (
 ))
 VIEW = UniformStruct("ViewTransform", (
     ("mat4", "clip_from_world"), ("vec3", "position_world"), ("float", "far"), ("vec3", "forward_world"), ("int", "orthographic"),
+    ("int", "seed"),
 ))
 
 # What each pass over the scene's surfaces reads of a material, and its render targets.
 SURFACE_PASSES = {
     "rsm_capture": (("albedo", "alpha"), ("position", "normal", "flux")),
-    "gbuffer": (MATERIAL_INPUTS, ("position", "normal", "albedo", "base_color", "emission")),
+    "gbuffer": (MATERIAL_INPUTS, ("position", "normal", "albedo", "base_color", "emission", "geometry")),
+    "shadow": (("alpha",), ("depth",)),
 }
 
 

@@ -11,7 +11,7 @@ import gpu
 import numpy as np
 
 from ..scene import Material, Mesh, Scene
-from ..transport.geometry import Geometry
+from ..transport.geometry import normal_matrices
 from .device import bind, uniform_buffer, vertex_buffer
 from .materials import Images, Slots, uniforms
 from .packing import fold
@@ -21,25 +21,28 @@ from .textures import upload
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """Where from and how the scene is drawn: ``clip_from_world`` (4, 4), ``world_from_view`` (4, 4) looking along −Z."""
+    """Where from and how the scene is drawn: ``clip_from_world`` (4, 4), ``world_from_view`` (4, 4) looking along −Z. ``seed`` is
+    that of the coins which decide about coverage without a threshold."""
 
     clip_from_world: np.ndarray
     world_from_view: np.ndarray
     far: float
     orthographic: bool
+    seed: int = 0
 
     @property
     def uniforms(self) -> dict:
         """Values of the struct VIEW."""
         return {"clip_from_world": self.clip_from_world, "position_world": self.world_from_view[:3, 3], "far": self.far,
-                "forward_world": -self.world_from_view[:3, 2], "orthographic": int(self.orthographic)}
+                "forward_world": -self.world_from_view[:3, 2], "orthographic": int(self.orthographic),
+                "seed": self.seed}
 
 
 @dataclass(frozen=True, eq=False)
 class _Draw:
-    """``hidden`` is the winding that culling leaves out, in Blender's words."""
+    """``hidden`` is the winding that culling leaves out, in Blender's words; ``layout`` what ``surface_program`` asks for."""
 
-    program: object
+    layout: tuple[int, int, bool]
     batch: gpu.types.GPUBatch
     material: gpu.types.GPUUniformBuf
     images: dict[str, gpu.types.GPUTexture]
@@ -48,21 +51,17 @@ class _Draw:
 
 
 class SurfacePass:
-    """One of SURFACE_PASSES over the surfaces of ``scene``, whose triangles are numbered as in ``geometry``."""
+    """The surfaces of ``scene``, ready for pass ``name`` of SURFACE_PASSES and for those that read no more of a material. Triangles
+    are numbered instance by instance, as in transport.geometry.Geometry."""
 
-    def __init__(self, scene: Scene, geometry: Geometry, name: str, images: Images | None = None):
+    def __init__(self, scene: Scene, name: str, images: Images | None = None):
         self._inputs, self._name = SURFACE_PASSES[name][0], name
         self._images = images or Images()
-        groups: dict[tuple, list[int]] = {}
-        for index, instance in enumerate(scene.instances):
-            override = tuple(sorted((instance.material_override or {}).items()))
-            mirrored = bool(np.linalg.det(np.asarray(instance.world_from_local, np.float64)[:3, :3]) < 0)
-            groups.setdefault((instance.mesh, override, mirrored), []).append(index)
-        ordered = [index for members in groups.values() for index in members]
-        self._instances = upload(fold(_instance_rows(scene, geometry)[ordered].reshape(len(ordered), -1)))
+        self._groups = _groups(scene)
+        self.move(scene)
         self._draws, first = [], 0
         materials = scene.materials or (Material("default"),)
-        for (mesh_index, override, mirrored), members in groups.items():
+        for (mesh_index, override, mirrored), members in self._groups.items():
             mesh = scene.meshes[mesh_index]
             for old in np.unique(mesh.triangle_material):
                 material = materials[dict(override).get(int(old), int(old))]
@@ -70,24 +69,45 @@ class SurfacePass:
                 self._draws.append(self._draw_of(mesh, triangles, material, first, len(members), mirrored))
             first += len(members)
 
+    def can_move(self, scene: Scene) -> bool:
+        """True if ``scene``, which has the same meshes and materials, differs in nothing but where instances stand."""
+        return _groups(scene) == self._groups
+
+    def move(self, scene: Scene) -> None:
+        """Place the instances where they are in ``scene``."""
+        ordered = [index for members in self._groups.values() for index in members]
+        self._instances = upload(fold(_instance_rows(scene)[ordered].reshape(len(ordered), -1)))
+
     def _draw_of(self, mesh: Mesh, triangles: np.ndarray, material: Material, first: int, count: int, mirrored: bool) -> _Draw:
         slots = Slots(material, self._inputs)
-        smooth = mesh.corner_normals_local is not None
-        program = surface_program(self._name, len(slots.uv_layers), len(slots.attributes), smooth)
         batch = gpu.types.GPUBatch(type="TRIS", buf=vertex_buffer(_attributes(mesh, triangles, slots)))
         buffer = uniform_buffer(MATERIAL, uniforms(material, slots, self._inputs, first))
         images = {f"{name}_image": self._images.get(getattr(material, name).texture) for name in self._inputs}
         backs = "FRONT" if mirrored else "BACK"
-        return _Draw(program, batch, buffer, images, count, backs if material.backface_culling else "NONE")
+        layout = len(slots.uv_layers), len(slots.attributes), mesh.corner_normals_local is not None
+        return _Draw(layout, batch, buffer, images, count, backs if material.backface_culling else "NONE")
 
-    def draw(self, view: View, samplers: Mapping[str, gpu.types.GPUTexture] | None = None, *, cull: bool = False) -> None:
-        """Draw everything into the target that is bound. ``cull`` leaves out the backs of materials that say so."""
+    def draw(self, view: View, samplers: Mapping[str, gpu.types.GPUTexture] | None = None, *, cull: bool = False,
+             name: str | None = None) -> None:
+        """Draw everything into the target that is bound, with pass ``name`` instead of its own if one is given. ``cull`` leaves out
+        the backs of materials that say so."""
         shared = uniform_buffer(VIEW, view.uniforms)
         for draw in self._draws:
             gpu.state.face_culling_set(draw.hidden if cull else "NONE")
-            shader, _alive = bind(draw.program, uniforms={"view": shared, "material": draw.material},
+            shader, _alive = bind(surface_program(name or self._name, *draw.layout),
+                                  uniforms={"view": shared, "material": draw.material},
                                   samplers={"instances": self._instances, **draw.images, **(samplers or {})})
             draw.batch.draw_instanced(shader, instance_start=0, instance_count=draw.count)
+
+
+def _groups(scene: Scene) -> dict[tuple, list[int]]:
+    """Instances by what they can be drawn together for: mesh, overridden materials, whether they are mirrored."""
+    groups: dict[tuple, list[int]] = {}
+    _, mirrored = normal_matrices(scene)
+    for index, instance in enumerate(scene.instances):
+        override = tuple(sorted((instance.material_override or {}).items()))
+        groups.setdefault((instance.mesh, override, bool(mirrored[index])), []).append(index)
+    return groups
 
 
 def decode_primitive(position: np.ndarray, normal: np.ndarray) -> np.ndarray:
@@ -95,14 +115,14 @@ def decode_primitive(position: np.ndarray, normal: np.ndarray) -> np.ndarray:
     return position[..., 3].astype(np.int32) * 65536 + normal[..., 3].astype(np.int32) - 1
 
 
-def _instance_rows(scene: Scene, geometry: Geometry) -> np.ndarray:
+def _instance_rows(scene: Scene) -> np.ndarray:
     """(i, 6, 4) float32: what surface.vert.glsl reads of every instance."""
     counts = [len(scene.meshes[instance.mesh].triangles) for instance in scene.instances]
     starts = np.cumsum([0, *counts[:-1]])
     rows = np.zeros((len(counts), 6, 4), np.float32)
     rows[:, :3] = [np.asarray(instance.world_from_local)[:3] for instance in scene.instances]
     # Scaled to a largest element of 1: the cofactors of a tiny instance underflow when they are squared.
-    matrices = geometry.normal_matrices
+    matrices, _ = normal_matrices(scene)
     rows[:, 3:, :3] = matrices / np.maximum(np.abs(matrices).max(axis=(1, 2), keepdims=True), np.finfo(np.float32).tiny)
     rows[:, 3, 3], rows[:, 4, 3], rows[:, 5, 3] = starts // 65536, starts % 65536, np.arange(len(counts))
     return rows

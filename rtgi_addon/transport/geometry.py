@@ -54,8 +54,7 @@ def flatten(scene: Scene) -> Geometry:
     mesh_offsets = np.concatenate(([0], np.cumsum([len(mesh.triangles) for mesh in scene.meshes]))).astype(np.int64)
     triangles = np.empty((total, 3, 3), np.float32)
     material, index, mesh_triangle, local = (np.empty(total, np.int32) for _ in range(4))
-    normal_matrices = np.empty((len(scene.instances), 3, 3), np.float32)
-    mirrored = np.zeros(len(scene.instances), bool)
+    matrices, mirrored = normal_matrices(scene)
     start = 0
     for i, (instance, count) in enumerate(zip(scene.instances, counts, strict=True)):
         mesh = scene.meshes[instance.mesh]
@@ -66,18 +65,22 @@ def flatten(scene: Scene) -> Geometry:
         index[span] = i
         local[span] = np.arange(count, dtype=np.int32)
         mesh_triangle[span] = local[span] + np.int32(mesh_offsets[instance.mesh])
-        linear = np.asarray(instance.world_from_local, np.float64)[:3, :3]
-        # The cofactor matrix is the inverse transpose up to a positive or negative scale and exists for flattened axes too.
-        cofactor = np.stack([np.cross(linear[1], linear[2]), np.cross(linear[2], linear[0]), np.cross(linear[0], linear[1])])
-        mirrored[i] = np.linalg.det(linear) < 0
-        normal_matrices[i] = -cofactor if mirrored[i] else cofactor
     edges = triangles[:, 1:] - triangles[:, :1]
     normals = np.cross(edges[:, 0], edges[:, 1])
     lengths = np.sqrt(np.einsum("ij,ij->i", normals, normals))
     normals /= np.maximum(lengths, np.finfo(np.float32).tiny)[:, None]
     normals[mirrored[index]] *= -1.0
-    return Geometry(triangles, normals, lengths * np.float32(0.5), material, index, mesh_triangle, local, normal_matrices,
-                    mesh_offsets)
+    return Geometry(triangles, normals, lengths * np.float32(0.5), material, index, mesh_triangle, local, matrices, mesh_offsets)
+
+
+def normal_matrices(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """For every instance the inverse transpose (i, 3, 3) float32 up to a positive scale, and whether it is mirrored (i,) bool."""
+    linear = np.array([instance.world_from_local for instance in scene.instances], np.float64).reshape(-1, 4, 4)[:, :3, :3]
+    # The cofactor matrix is the inverse transpose up to a positive or negative scale and exists for flattened axes too.
+    cofactors = np.stack([np.cross(linear[:, 1], linear[:, 2]), np.cross(linear[:, 2], linear[:, 0]),
+                          np.cross(linear[:, 0], linear[:, 1])], axis=1)
+    mirrored = np.linalg.det(linear) < 0
+    return np.where(mirrored[:, None, None], -cofactors, cofactors).astype(np.float32), mirrored
 
 
 def _world_vertices(mesh: Mesh, instance: Instance) -> np.ndarray:

@@ -105,7 +105,15 @@ def views_of(context, lamp: int, resolution: int = 512, *, focus: np.ndarray | N
     area lamp ``area_points`` stratified points with a hemicube each, or a frustum if its beam is narrow.
     """
     light = context.scene.lights[lamp]
-    bounds = np.array(context.geometry.bounds(), np.float64)
+    views = views_of_light(light, np.array(context.geometry.bounds(), np.float64), resolution, lamp, focus=focus,
+                           area_points=area_points)
+    # A wide spot reaches some faces of its cube only.
+    return tuple(view for view in views if texel_power(light, view).any()) if isinstance(light, SpotLight) else views
+
+
+def views_of_light(light: Light, bounds: np.ndarray, resolution: int, lamp: int = 0, *, focus: np.ndarray | None = None,
+                   area_points: int = 4) -> tuple[ShadowView, ...]:
+    """As ``views_of``, for a scene within ``bounds`` (2, 3) of which no more is known; a wide spot gets all the faces of its cube."""
     if not np.any(_strength(light) > 0):
         return ()
     if isinstance(light, SunLight):
@@ -116,9 +124,7 @@ def views_of(context, lamp: int, resolution: int = 512, *, focus: np.ndarray | N
         placed = _spot_views(light, bounds)
     else:
         placed = _area_views(light, bounds, area_points)
-    views = tuple(ShadowView(lamp, face, *view[:3], resolution, *view[3:]) for face, view in enumerate(placed))
-    # A wide spot reaches some faces of its cube only.
-    return tuple(view for view in views if texel_power(light, view).any()) if isinstance(light, SpotLight) else views
+    return tuple(ShadowView(lamp, face, *view[:3], resolution, *view[3:]) for face, view in enumerate(placed))
 
 
 def texel_power(light: Light, view: ShadowView) -> np.ndarray:

@@ -36,7 +36,7 @@ def drawn(scene, view, resolution):
     from rtgi_addon.preview.textures import download
     context = LightContext(scene, 1)
     target = GBuffer(resolution, resolution)
-    target.draw(gbuffer_surfaces(scene, context.geometry), View(view.clip_from_world, view.world_from_view, view.far, False))
+    target.draw(gbuffer_surfaces(scene), View(view.clip_from_world, view.world_from_view, view.far, False))
     return context, {name: download(texture) for name, texture in target.textures.items()}
 
 

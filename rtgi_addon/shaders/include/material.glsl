@@ -43,7 +43,8 @@ vec3 material_input(int index, sampler2D image)
 // A coin per texel and triangle for coverage without a threshold, from [0, 1).
 float coverage_coin(ivec2 texel, int primitive)
 {
-  uint state = uint(texel.x) * 0x9E3779B9u ^ uint(texel.y) * 0x85EBCA6Bu ^ uint(primitive) * 0xC2B2AE35u;
+  uint state = uint(texel.x) * 0x9E3779B9u ^ uint(texel.y) * 0x85EBCA6Bu ^ uint(primitive) * 0xC2B2AE35u ^
+               uint(view.seed) * 0x27D4EB2Fu;
   state ^= state >> 16;
   state *= 0x7FEB352Du;
   state ^= state >> 15;

@@ -1,0 +1,69 @@
+"""Where a picture is seen from: a camera's or a viewport's matrices, the rays of its background, and its jitter."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..scene import Camera
+from .surfaces import View
+
+
+@dataclass(frozen=True, eq=False)
+class CameraView:
+    """``world_from_camera`` (4, 4) rigid, looking along −Z with +Y up; ``clip_from_camera`` (4, 4) an OpenGL projection, perspective
+    or orthographic: a viewport's ``view_matrix.inverted()`` and ``window_matrix``."""
+
+    world_from_camera: np.ndarray
+    clip_from_camera: np.ndarray
+
+    @staticmethod
+    def of(camera: Camera) -> "CameraView":
+        """The view through a camera of the scene."""
+        return CameraView(camera.world_from_camera, camera.clip_from_camera)
+
+    @property
+    def orthographic(self) -> bool:
+        """True for a parallel projection."""
+        return bool(self.clip_from_camera[3, 3] != 0)
+
+    @property
+    def depths(self) -> tuple[float, float]:
+        """Near and far plane [m] along −Z."""
+        scale, offset = (float(value) for value in self.clip_from_camera[2, 2:4])
+        if self.orthographic:
+            return (offset + 1.0) / scale, (offset - 1.0) / scale
+        return offset / (scale - 1.0), offset / (scale + 1.0)
+
+    def equals(self, other: "CameraView | None") -> bool:
+        """True if both show the same, so that their samples may be mixed."""
+        return other is not None and np.array_equal(self.world_from_camera, other.world_from_camera) and np.array_equal(
+            self.clip_from_camera, other.clip_from_camera)
+
+    def drawn(self, size: tuple[int, int], offset=(0.0, 0.0)) -> View:
+        """The view to draw ``size`` (width, height) pixels with, shifted by ``offset`` (2,) pixels."""
+        clip_from_world = self._shifted(size, offset) @ np.linalg.inv(np.asarray(self.world_from_camera, np.float64))
+        return View(clip_from_world, np.asarray(self.world_from_camera, np.float64), self.depths[1], self.orthographic)
+
+    def rays(self, size: tuple[int, int], offset=(0.0, 0.0)) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """World directions as an affine map of the picture's (x, y) in [0, 1]², y up: base + x·across + y·up, (3,) each, not unit."""
+        world_from_clip = np.asarray(self.world_from_camera, np.float64) @ np.linalg.inv(self._shifted(size, offset))
+        ends = np.array([[(x, y, depth, 1.0) for x, y in ((-1, -1), (1, -1), (-1, 1))] for depth in (-1.0, 1.0)])
+        ends = ends @ world_from_clip.T
+        near, far = ends[..., :3] / ends[..., 3:]
+        base, right, top = (far - near) / np.linalg.norm(far[0] - near[0])
+        return base, right - base, top - base
+
+    def corners(self, near: float, far: float) -> np.ndarray:
+        """World corners (8, 3) of the part of the view between two depths [m] along −Z."""
+        result = []
+        for depth in (near, far):
+            clip = self.clip_from_camera @ np.array([0.0, 0.0, -depth, 1.0])
+            ends = np.array([(x * clip[3], y * clip[3], clip[2], clip[3]) for x in (-1, 1) for y in (-1, 1)])
+            result.append(ends @ np.linalg.inv(self.clip_from_camera).T)
+        points = np.concatenate(result)
+        return (points[:, :3] / points[:, 3:]) @ self.world_from_camera[:3, :3].T + self.world_from_camera[:3, 3]
+
+    def _shifted(self, size: tuple[int, int], offset) -> np.ndarray:
+        shift = np.eye(4)
+        shift[:2, 3] = 2.0 * np.asarray(offset, np.float64) / size
+        return shift @ np.asarray(self.clip_from_camera, np.float64)

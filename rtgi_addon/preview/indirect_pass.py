@@ -1,0 +1,96 @@
+"""The pass that writes indirect irradiance for every pixel of a G-buffer, whichever technique it comes from.
+
+A technique brings ``shaders/indirect_NAME.comp.glsl``, which includes its own ``vec3 indirect_irradiance(vec3 position_world, vec3
+normal_world)`` and then include/indirect_frame.glsl; ``indirect_program`` adds what the frame reads and writes to its resources.
+"""
+
+from collections.abc import Mapping
+from typing import Protocol
+
+import gpu
+import numpy as np
+
+from ..numerics import sh
+from ..scene import Scene, World
+from .device import dispatch
+from .program import Image, Program
+from .uniforms import UniformStruct
+
+FRAME = UniformStruct("IndirectFrame", (("ivec2", "size"),))
+
+
+class Indirect(Protocol):
+    """One technique's indirect light on the GPU: ``program`` made by ``indirect_program``, and the ``uniforms`` and ``samplers`` of the
+    names that were given to it."""
+
+    program: Program
+
+    @property
+    def uniforms(self) -> Mapping[str, object]:
+        """Values (or buffers) of the program's uniform buffers but the frame's, by name."""
+
+    @property
+    def samplers(self) -> Mapping[str, gpu.types.GPUTexture]:
+        """Textures of the program's samplers but the G-buffer's, by name."""
+
+    def follow(self, scene: Scene) -> bool:
+        """Take in that ``scene`` has changed (lamps moved, the world turned) as far as the technique can without a new bake; what
+        of it runs on the GPU runs here. False if its light does not fit the scene any more."""
+
+
+def indirect_program(name: str, uniforms: tuple = (), samplers: tuple[str, ...] = (), defines: tuple = ()) -> Program:
+    """The program of ``shaders/NAME.comp.glsl`` with the frame's resources in front of the technique's own."""
+    return Program(name, uniforms=(("frame", FRAME), *uniforms), samplers=("gbuffer_position", "gbuffer_normal", *samplers),
+                   images=(Image("irradiance"),), local_size=(8, 8), defines=defines)
+
+
+def draw_indirect(indirect: Indirect, gbuffer: Mapping[str, gpu.types.GPUTexture], irradiance: gpu.types.GPUTexture) -> None:
+    """Write ``irradiance`` [W·m⁻²] for the G-buffer's textures ``position`` and ``normal``."""
+    size = irradiance.width, irradiance.height
+    dispatch(indirect.program, size, uniforms={"frame": {"size": size}, **indirect.uniforms},
+             samplers={"gbuffer_position": gbuffer["position"], "gbuffer_normal": gbuffer["normal"], **indirect.samplers},
+             images={"irradiance": irradiance})
+
+
+class WorldLight:
+    """The light of the world alone, as if nothing stood in its way: what is shown where there is no bake."""
+
+    program = indirect_program("indirect_world", (("world_light", UniformStruct("WorldLight", (("vec4", "cosine_sh", 9),))),))
+
+    def __init__(self, scene: Scene):
+        self.follow(scene)
+
+    @property
+    def uniforms(self) -> dict:
+        """See Indirect."""
+        return {"world_light": {"cosine_sh": self._cosine_sh}}
+
+    @property
+    def samplers(self) -> dict:
+        """See Indirect."""
+        return {}
+
+    def follow(self, scene: Scene) -> bool:
+        """See Indirect."""
+        self._cosine_sh = np.zeros((9, 4), np.float32)
+        self._cosine_sh[:, :3] = sh.cosine_coefficients(2)[:, None] * world_sh(scene.world, 2)
+        return True
+
+
+def world_sh(world: World, order: int) -> np.ndarray:
+    """SH projection ((order + 1)², 3) of the world's radiance, texel by texel."""
+    pixels = np.asarray(world.equirect, np.float64)
+    if bool(np.all(pixels == pixels[:1, :1])):
+        result = np.zeros(((order + 1) ** 2, 3))
+        result[0] = pixels[0, 0] * np.sqrt(4.0 * np.pi)
+        return result
+    height, width = pixels.shape[:2]
+    azimuth = (0.5 - (np.arange(width) + 0.5) / width) * 2.0 * np.pi
+    latitude = ((np.arange(height) + 0.5) / height - 0.5) * np.pi
+    across = np.cos(latitude)[:, None]
+    local = np.stack([across * np.cos(azimuth), across * np.sin(azimuth), np.repeat(np.sin(latitude)[:, None], width, axis=1)], -1)
+    # Exact areas of the latitude bands.
+    edges = np.sin((np.arange(height + 1) / height - 0.5) * np.pi)
+    solid_angles = np.repeat(np.diff(edges) * (2.0 * np.pi / width), width)
+    directions = local.reshape(-1, 3) @ np.asarray(world.map_from_world, np.float64)
+    return sh.project(directions, pixels.reshape(-1, 3), solid_angles, order)

@@ -1,0 +1,22 @@
+"""What a user may set for the preview."""
+
+from dataclasses import dataclass
+
+from ..techniques.base import setting
+
+# Everything that a frame can be asked for, in the order of film.comp.glsl; scene-linear, four floats a pixel.
+PASSES = ("combined", "direct", "indirect", "irradiance", "albedo", "normal", "depth", "object")
+
+
+@dataclass(frozen=True)
+class PreviewSettings:
+    """What the preview shows, and how much work a frame may be."""
+
+    samples: int = setting(64, "Samples", "Frames that are averaged until a still picture is done", "", 1, 65536)
+    resolution_scale: float = setting(1.0, "Resolution", "Share of the region's width and height that is rendered", "", 0.1, 1.0)
+    mode: str = setting("combined", "Show", "What the viewport shows", choices=PASSES[:-1])
+    shadow_resolution: int = setting(1024, "Shadow Map", "Texels along each side of a shadow map", "px", 64, 8192)
+    shadow_cascades: int = setting(3, "Sun Cascades", "Shadow maps a sun has, for near to far parts of the view", "", 1, 6)
+    shadow_views: int = setting(64, "Shadow Views", "Shadow maps drawn a frame; where lamps need more, every frame has its "
+                                "share of them", "", 8, 4096)
+    film_transparent: bool = setting(False, "Transparent", "Leave the world out of the picture; it still lights the scene")
