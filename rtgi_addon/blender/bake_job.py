@@ -17,7 +17,7 @@ from .extract.volumes import fit_volume
 from .fingerprint import fingerprint
 from .gpu_context import open_context
 from .properties import scene_settings
-from .session import Finding, session
+from .session import Baked, Finding, session
 from .worker import KernelsOnMainThread
 
 
@@ -35,10 +35,12 @@ def prepare(context) -> Callable[[Progress], object]:
     device = scene.rtgi.device.lower() if "gpu" in technique.devices else "cpu"
     kernels = _gpu_kernels() if device == "gpu" else None
     extracted = extract_scene(context=context)
+    key = scene.name, technique.name
 
     def bake(progress: Progress):
         return bake_scene(extracted, technique.name, out=output, seed=seed, base=asdict(settings), progress=progress, device=device,
-                          kernels=None if kernels is None else KernelsOnMainThread(kernels, progress))
+                          kernels=None if kernels is None else KernelsOnMainThread(kernels, progress),
+                          keep=lambda field: session.baked.__setitem__(key, Baked(field, extracted)))
 
     return bake
 

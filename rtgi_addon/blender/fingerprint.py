@@ -43,6 +43,15 @@ def fingerprint(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> str:
     return digest.hexdigest()
 
 
+def node_digest(*owners) -> str:
+    """A hexadecimal digest of the shader nodes of materials, worlds or lamps (None counts too)."""
+    digest, seen = hashlib.blake2b(digest_size=16), set()
+    for owner in owners:
+        digest.update(b"-" if owner is None else b"+")
+        _add_nodes(digest, owner, seen)
+    return digest.hexdigest()
+
+
 def _add_data(digest, obj) -> None:
     if obj.type == "MESH":
         positions = np.empty(3 * len(obj.data.vertices), np.float32)

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 
 import bpy
 
+from ..scene import Scene
+from ..techniques import Field
 from .worker import BakeWorker
 
 
@@ -18,13 +20,22 @@ class Finding:
     text: str
 
 
+@dataclass(frozen=True, eq=False)
+class Baked:
+    """A field that was baked in this session, and the scene it was baked from, which relights it."""
+
+    field: Field
+    scene: Scene
+
+
 @dataclass
 class Session:
     """``worker`` is the latest bake, which may have ended; ``baking`` names its scene while it runs.
 
     By scene name: ``findings`` of its last reading (absent before the first); ``errors``, why the last attempt failed;
     ``digests`` of the scene as it was last read; ``records``, what was written to ``Scene.rtgi.last_bake`` in this session;
-    ``stale``, whether it differs from its last bake.
+    ``stale``, whether it differs from its last bake. ``baked`` holds, by scene name and technique, the last bake of this session:
+    the preview shows and relights it.
     """
 
     worker: BakeWorker | None = None
@@ -34,6 +45,7 @@ class Session:
     digests: dict[str, str] = field(default_factory=dict)
     records: dict[str, dict] = field(default_factory=dict)
     stale: dict[str, bool] = field(default_factory=dict)
+    baked: dict[tuple[str, str], Baked] = field(default_factory=dict)
 
     @property
     def running(self) -> bool:
@@ -45,7 +57,7 @@ class Session:
         if self.worker is not None:
             self.worker.cancel()
         self.baking = ""
-        for known in (self.findings, self.errors, self.digests, self.records, self.stale):
+        for known in (self.findings, self.errors, self.digests, self.records, self.stale, self.baked):
             known.clear()
 
 

@@ -1,6 +1,7 @@
 """From a Scene to a finished bundle: the one bake that the shell, the module and the panel share."""
 
 import contextlib
+from collections.abc import Callable
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from ..exchange.bundle import check_target, write_bundle
 from ..progress import Progress
 from ..scene import ProbeVolume, Scene
 from ..scene.checks import check_scene, require
+from ..techniques import Field
 from ..techniques.kernels import Kernels
 from ..transport.rays import slow_rays_warning
 from .checkpoint import FileCheckpoint
@@ -27,7 +29,7 @@ PICTURE_FROM = 0.8
 def bake_scene(scene: Scene, technique: str = "probes", overrides: dict | None = None, out="bake", *,
                base: dict | None = None, seed: int = 0, threads: int | None = None, progress: Progress | None = None,
                resume: bool = False, volume=None, checkpoint_seconds: float = 10.0, device: str = "cpu",
-               kernels: Kernels | None = None, picture=None) -> BakeSummary:
+               kernels: Kernels | None = None, picture=None, keep: Callable[[Field], None] | None = None) -> BakeSummary:
     """Bake the volumes of ``scene`` with the technique called ``technique`` into the bundle ``out``.
 
     ``overrides`` maps names of the technique's settings to values and wins over what a volume itself carries, which wins over
@@ -36,7 +38,7 @@ def bake_scene(scene: Scene, technique: str = "probes", overrides: dict | None =
     (None = every core), interrupted and continued with ``resume`` or not. A checkpoint is left in `OUT.partial` at most every
     ``checkpoint_seconds`` and removed once the bundle is written. With the ``device`` 'gpu' the technique's inner loops run as
     ``kernels`` (None: on Blender's GPU, from this thread, which must then be the main one). ``picture`` is a PNG to draw the
-    probes into after that.
+    probes into after that; ``keep`` is given the finished field, which knows more than the bundle does.
 
     Raises BakeError for what the user can mend and Cancelled once ``progress.cancel`` was called: the bundle that was at
     ``out`` before is then as it was. Any other exception of the technique goes through unchanged, with the same promise.
@@ -71,6 +73,8 @@ def bake_scene(scene: Scene, technique: str = "probes", overrides: dict | None =
         checkpoint.remove_if_empty()
         raise
     checkpoint.remove()
+    if keep is not None:
+        keep(field)
     summary = summarize(field, scene, out=target, technique=technique, settings=asdict(settings), seed=seed, warnings=warnings,
                         resumed=checkpoint.resumed, stats=_stats(field, progress))
     if picture is not None:

@@ -3,6 +3,7 @@
 import bpy
 
 from ...scene import Scene
+from .. import remembered
 from ..materials import MaterialReader
 from .cameras import read_camera
 from .instances import GeometryCollector
@@ -12,7 +13,7 @@ from .volumes import describe, fit_volume, is_volume, read_volume, select_volume
 from .world import read_world
 
 
-def extract_scene(depsgraph=None, *, context=None, volumes: list[str] | None = None, progress=None) -> Scene:
+def extract_scene(depsgraph=None, *, context=None, volumes: list[str] | None = None, progress=None, reuse: bool = False) -> Scene:
     """The scene of ``context`` (default: the current one) as plain arrays that outlive the file. Main thread only.
 
     Without a ``depsgraph`` the scene is evaluated exactly as for F12: render subdivision levels, modifiers enabled for render,
@@ -24,8 +25,9 @@ def extract_scene(depsgraph=None, *, context=None, volumes: list[str] | None = N
     the distance to a lamp in Blender units whatever it is, and so does the bake.
 
     ``volumes`` names the Light Probe Volumes to bake (None: every visible one; with none in the file one is fitted, and
-    ``Scene.notes`` says so). ``progress`` is a ``rtgi_addon.progress.Progress``. Raises UsageError for an unknown volume,
-    BakeError where there is nothing to fit a volume to, Cancelled.
+    ``Scene.notes`` says so). ``progress`` is a ``rtgi_addon.progress.Progress``. With ``reuse``, worlds and materials that
+    only Cycles understands are what it made of them last (see `remembered`). Raises UsageError for an unknown volume, BakeError
+    where there is nothing to fit a volume to, Cancelled.
     """
     context = context or bpy.context
     scene = depsgraph.scene.original if depsgraph is not None else context.scene
@@ -37,7 +39,8 @@ def extract_scene(depsgraph=None, *, context=None, volumes: list[str] | None = N
         if view_layer is None or scene.view_layers.get(view_layer.name) != view_layer:
             view_layer = scene.view_layers[0]
         read_for_render(scene, view_layer, reading.read)
-    return reading.finish()
+    with remembered.reuse(reuse):
+        return reading.finish()
 
 
 class _Reading:
@@ -65,7 +68,7 @@ class _Reading:
             if self._progress is not None and count % 256 == 0:
                 self._progress.step(0.0, f"reading object {count}")
             obj = item.object
-            if not item.show_self or (in_viewport and _hidden_from_render(item)):
+            if not is_shown(item, in_viewport):
                 continue
             if obj.type == "LIGHT":
                 light = read_lamp(obj, item.matrix_world, self._notes)
@@ -98,6 +101,9 @@ class _Reading:
             self._cameras.append(camera)
 
 
-def _hidden_from_render(item) -> bool:
-    """True if the object, or what places it, is hidden from render."""
-    return item.object.hide_render or (item.parent is not None and item.parent.hide_render)
+def is_shown(item, in_viewport: bool) -> bool:
+    """True if a ``DepsgraphObjectInstance`` is part of the picture; ``in_viewport`` says whose dependency graph it comes from."""
+    if not item.show_self:
+        return False
+    hidden = item.object.hide_render or (item.parent is not None and item.parent.hide_render)
+    return not (in_viewport and hidden)

@@ -4,6 +4,8 @@ import bpy
 import numpy as np
 
 from ...scene import World
+from ..fingerprint import node_digest
+from ..remembered import answer
 from .panorama import render_panorama
 from .sockets import source_of
 
@@ -39,7 +41,8 @@ def read_world(world, notes: list[str]) -> World:
             found = _environment(color.node, strength, notes)
             if found is not None:
                 return found
-    return World(np.maximum(render_panorama(world), 0.0), description="Cycles panorama")
+    panorama = answer(lambda: node_digest(world), lambda: render_panorama(world))
+    return World(np.maximum(panorama, 0.0), description="Cycles panorama")
 
 
 def _environment(node, strength, notes):

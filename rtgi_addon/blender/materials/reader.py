@@ -5,7 +5,10 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
+from ...jobs.fingerprint import content_hash
 from ...scene import Channel, Material, Mesh
+from ..fingerprint import node_digest
+from ..remembered import answer
 from .fallback import BAKE_UV, BakedNodes, BakedShaders, bake_leaves, wanted_leaves
 from .images import ImageCache
 from .nodes import ACTIVE_COLOR, NodeReader
@@ -78,7 +81,7 @@ class MaterialReader:
         """
         try:
             leaves = {slot: wanted_leaves(self._images, request.materials[slot]) for slot in request.slots}
-            baked, uv = bake_leaves(request, leaves, self._scene)
+            baked, uv = answer(lambda: _digest(request, mesh), lambda: bake_leaves(request, leaves, self._scene))
         finally:
             self._discard(request)
         attributes = dict(mesh.attributes)
@@ -129,6 +132,12 @@ class MaterialReader:
         if request in self._requests:
             self._requests.remove(request)
             bpy.data.meshes.remove(request.mesh)
+
+
+def _digest(request: BakeRequest, mesh: Mesh) -> str:
+    """What a Cycles bake of a request depends on."""
+    placed = (tuple(map(tuple, request.world_from_local)), request.color, request.pass_index, request.slots)
+    return node_digest(*request.materials) + content_hash((placed, mesh))
 
 
 def _channel(value: Value) -> Channel:
