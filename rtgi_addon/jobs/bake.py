@@ -15,6 +15,7 @@ from ..scene import ProbeVolume, Scene
 from ..scene.checks import check_scene, require
 from ..techniques import Field
 from ..techniques.kernels import Kernels
+from ..techniques.probes.field import ProbeField
 from ..transport.rays import slow_rays_warning
 from .checkpoint import FileCheckpoint
 from .fingerprint import fingerprint
@@ -78,7 +79,9 @@ def bake_scene(scene: Scene, technique: str = "probes", overrides: dict | None =
     summary = summarize(field, scene, out=target, technique=technique, settings=asdict(settings), seed=seed, warnings=warnings,
                         resumed=checkpoint.resumed, stats=_stats(field, progress))
     if picture is not None:
-        picture = draw_probes(scene, field, picture, threads=threads, progress=progress.span(PICTURE_FROM, 1.0))
+        # What was shipped is what is seen: walls lit by the probes, not by the technique behind them.
+        shown = field if isinstance(field, ProbeField) else ProbeField(field.grids(), includes_direct=field.includes_direct)
+        picture = draw_probes(scene, shown, picture, threads=threads, progress=progress.span(PICTURE_FROM, 1.0))
         summary = replace(summary, picture=picture)
     # The bundle is written: a wish to stop that comes only now is too late.
     with contextlib.suppress(Cancelled):
