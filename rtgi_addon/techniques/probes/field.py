@@ -60,7 +60,7 @@ class ProbeField(Field):
         points, normals = np.asarray(points), np.asarray(normals)
         share = self._shares(points)
         total = np.zeros((len(points), 3), np.float32)
-        for lookup, weight in zip(self._lookups, share.T, strict=True):
+        for lookup, weight in zip(self.lookups, share.T, strict=True):
             inside = np.flatnonzero(weight)
             if len(inside):
                 total[inside] += weight[inside, None] * lookup.irradiance(points[inside], normals[inside])
@@ -95,21 +95,21 @@ class ProbeField(Field):
         return cls(grids, includes_direct=includes_direct, params=params, stats=stats, lookup=lookup)
 
     @cached_property
-    def _lookups(self) -> tuple[GridLookup, ...]:
+    def lookups(self) -> tuple[GridLookup, ...]:
         """One per grid, finest cells first; made on the first question, since a bake that only writes its grids asks none."""
         return tuple(sorted((GridLookup(grid, self.lookup) for grid in self._grids), key=lambda lookup: lookup.cell_volume))
 
     def _shares(self, points: np.ndarray) -> np.ndarray:
         """Share (n, volumes) float32 of each lookup in each point; rows sum to 1."""
-        share = np.zeros((len(points), len(self._lookups)), np.float32)
+        share = np.zeros((len(points), len(self.lookups)), np.float32)
         left = np.ones(len(points), np.float32)
-        for column, lookup in enumerate(self._lookups):
+        for column, lookup in enumerate(self.lookups):
             covered = lookup.coverage(points)
             share[:, column] = left * covered
             left *= 1.0 - covered
         total = share.sum(axis=1)
         outside = np.flatnonzero(total == 0.0)
         if len(outside):
-            nearest = np.argmin([lookup.distance(points[outside]) for lookup in self._lookups], axis=0)
+            nearest = np.argmin([lookup.distance(points[outside]) for lookup in self.lookups], axis=0)
             share[outside, nearest] = total[outside] = 1.0
         return share / total[:, None]

@@ -48,22 +48,27 @@ class LookupSettings:
 
 
 class GridLookup:
-    """One ``ProbeGrid`` made ready for reading: dilated, deringed if asked for, positions and distances laid out flat."""
+    """One ``ProbeGrid`` made ready for reading: dilated, deringed if asked for, positions and distances laid out flat.
+
+    ``centre`` (3,) float64 is the volume's [m], and ``positions`` (p, 3) float32 the probes' from there, offsets included; ``live``
+    (p,) bool tells which hold light; ``coefficients`` (p, k, 3) float32 are SH of radiance; ``moments`` (p·(T + 2)², 2) float32
+    mean and mean squared distance [m] in bordered octahedral tiles of ``tile`` T; ``bias`` [m] is the one along normals.
+    """
 
     def __init__(self, grid: ProbeGrid, settings: LookupSettings):
         self.settings = settings
         self.volume = grid.volume
         self.cell_volume = lattice.cell_volume(grid.volume.world_from_local, grid.volume.resolution)
-        self._bias = settings.normal_bias * lattice.cell_size(grid.volume.world_from_local, grid.volume.resolution).min()
+        self.bias = settings.normal_bias * lattice.cell_size(grid.volume.world_from_local, grid.volume.resolution).min()
         # Positions count from the volume's centre, so that float32 keeps its digits far from the world's origin.
-        self._centre = np.asarray(grid.volume.world_from_local, np.float64)[:3, 3]
-        points = lattice.lattice_points(grid.volume.world_from_local, grid.volume.resolution) - self._centre
-        self._positions = (points + grid.offset_world).reshape(-1, 3).astype(np.float32)
-        self._live = live_probes(grid).ravel()
+        self.centre = np.asarray(grid.volume.world_from_local, np.float64)[:3, 3]
+        points = lattice.lattice_points(grid.volume.world_from_local, grid.volume.resolution) - self.centre
+        self.positions = (points + grid.offset_world).reshape(-1, 3).astype(np.float32)
+        self.live = live_probes(grid).ravel()
         sh = dilate(grid).sh
-        self._coefficients = (dering(sh) if settings.reconstruction == "deringed" else sh).reshape(-1, *sh.shape[3:])
-        self._tile = grid.visibility.shape[3]
-        self._moments = octahedral.add_border(np.asarray(grid.visibility, np.float32)).reshape(-1, 2)
+        self.coefficients = (dering(sh) if settings.reconstruction == "deringed" else sh).reshape(-1, *sh.shape[3:])
+        self.tile = grid.visibility.shape[3]
+        self.moments = octahedral.add_border(np.asarray(grid.visibility, np.float32)).reshape(-1, 2)
 
     def coverage(self, points: np.ndarray) -> np.ndarray:
         """(n,) float32: 1 inside the volume, falling to 0 over its outermost cell, 0 outside."""
@@ -83,7 +88,7 @@ class GridLookup:
 
         Points outside take the outermost probes.
         """
-        result = np.empty((len(points), self._coefficients.shape[-1]), np.float32)
+        result = np.empty((len(points), self.coefficients.shape[-1]), np.float32)
         for start in range(0, len(points), _CHUNK):
             part = slice(start, start + _CHUNK)
             unit = np.asarray(normals[part], np.float32)
@@ -95,34 +100,34 @@ class GridLookup:
         position = lattice.lattice_from_world(self.volume.world_from_local, self.volume.resolution, points)
         index, trilinear = lattice.trilinear(position, self.volume.resolution)
         normals = np.asarray(normals, np.float32)
-        relative = (np.asarray(points, np.float64) - self._centre).astype(np.float32)
+        relative = (np.asarray(points, np.float64) - self.centre).astype(np.float32)
         seen = np.ones_like(trilinear)
         if self.settings.normal_weight:
-            seen *= _normal_weight(self._positions[index] - relative[:, None], normals)
+            seen *= _normal_weight(self.positions[index] - relative[:, None], normals)
         if self.settings.visibility:
-            biased = relative + np.float32(self._bias) * normals
-            seen *= self._chebyshev(index, biased[:, None] - self._positions[index])
+            biased = relative + np.float32(self.bias) * normals
+            seen *= self._chebyshev(index, biased[:, None] - self.positions[index])
         seen = np.where(seen < _CRUSH_BELOW, seen**3 / _CRUSH_BELOW**2, seen)
-        weight = trilinear * (np.where(self._live[index], seen + _UNSEEN_FLOOR, np.float32(0.0)) + _DILATED_FLOOR)
+        weight = trilinear * (np.where(self.live[index], seen + _UNSEEN_FLOOR, np.float32(0.0)) + _DILATED_FLOOR)
         return index, weight / weight.sum(axis=1, keepdims=True)
 
     def _blended(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         index, weight = self.weights(points, normals)
-        total = np.zeros((len(points), *self._coefficients.shape[1:]), np.float32)
+        total = np.zeros((len(points), *self.coefficients.shape[1:]), np.float32)
         for corner in range(8):
-            total += weight[:, corner, None, None] * self._coefficients[index[:, corner]]
+            total += weight[:, corner, None, None] * self.coefficients[index[:, corner]]
         return total
 
     def _chebyshev(self, index: np.ndarray, offset: np.ndarray) -> np.ndarray:
         """(n, 8): how surely probe ``index`` sees the point at ``offset`` (n, 8, 3) from it (one-sided Chebyshev, cubed)."""
         distance = np.linalg.norm(offset, axis=-1)
-        at_probe = (distance <= 1e-6 * self._bias)[..., None]
-        texel, fraction = octahedral.bilinear(np.where(at_probe, np.float32([0, 0, 1]), offset), self._tile)
-        width = self._tile + 2
+        at_probe = (distance <= 1e-6 * self.bias)[..., None]
+        texel, fraction = octahedral.bilinear(np.where(at_probe, np.float32([0, 0, 1]), offset), self.tile)
+        width = self.tile + 2
         texel = texel + index * (width * width)
         x, y = fraction[..., :1], fraction[..., 1:]
-        lower = (1.0 - x) * self._moments[texel] + x * self._moments[texel + 1]
-        upper = (1.0 - x) * self._moments[texel + width] + x * self._moments[texel + width + 1]
+        lower = (1.0 - x) * self.moments[texel] + x * self.moments[texel + 1]
+        upper = (1.0 - x) * self.moments[texel + width] + x * self.moments[texel + width + 1]
         moments = lower + y * (upper - lower)
         mean = moments[..., 0]
         variance = np.abs(moments[..., 1] - mean * mean)

@@ -1,0 +1,30 @@
+"""Indirect light in the preview: every technique's irradiance function in GLSL, and how it follows a lamp that moves.
+
+`tables` and a module a technique turn a field into arrays without knowing a GPU; `base` puts them on Blender's. The functions are
+`shaders/include/irradiance_*.glsl`, each the twin of its ``Field.irradiance``.
+"""
+
+from ...scene import Scene
+from ...techniques.base import Field
+
+
+def make_indirect(field: Field | None, scene: Scene):
+    """The indirect light (indirect_pass.Indirect) of ``field`` as baked from ``scene``: the technique's own function, or that of
+    its probe grids where it has none. Without a field it is the world's, with nothing in its way. GPU objects: main thread only."""
+    # Imported late: hosts without Blender's GPU use the tables of this package.
+    from ...techniques.probes.field import ProbeField
+    from ..indirect_pass import WorldLight
+    from .probes import probe_tables
+    from .relighting import RelitLight
+    if field is None:
+        return WorldLight(scene)
+    if isinstance(field, ProbeField):
+        return RelitLight(field, probe_tables)
+    return RelitLight(field, grid_tables)
+
+
+def grid_tables(field: Field):
+    """Tables of any field resampled to probe grids."""
+    from ...techniques.probes.field import ProbeField
+    from .probes import probe_tables
+    return probe_tables(ProbeField(field.grids(), includes_direct=field.includes_direct))

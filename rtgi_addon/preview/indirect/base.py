@@ -1,0 +1,61 @@
+"""A field's irradiance function on the GPU: the textures it reads, and how it follows the scene."""
+
+import gpu
+import numpy as np
+
+from ...scene import Scene
+from ..device import uniform_buffer
+from ..indirect_pass import draw_indirect, indirect_program
+from ..program import Program
+from ..textures import download, empty, upload
+from .tables import UNIFORMS, Tables
+
+
+class FieldLight:
+    """The indirect light of one field, for ``indirect_pass.draw_indirect``: ``program``, ``uniforms`` and ``samplers`` as asked
+    for there, of which each may change when the scene is followed.
+
+    ``includes_direct`` says that the light of lamps is in it already; ``error`` why it does not follow the scene, or None. GPU
+    objects: main thread only.
+    """
+
+    def __init__(self, tables: Tables, includes_direct: bool = False):
+        self.includes_direct = includes_direct
+        self.error: str | None = None
+        self.set(tables)
+
+    def set(self, tables: Tables) -> None:
+        """Show ``tables`` from now on."""
+        self.samplers: dict[str, gpu.types.GPUTexture] = {name: upload(texels) for name, texels in tables.textures.items()}
+        self.program: Program = indirect_program(tables.name, ((UNIFORMS, tables.struct),), tuple(self.samplers), tables.defines)
+        self.uniforms: dict[str, gpu.types.GPUUniformBuf] = {UNIFORMS: uniform_buffer(tables.struct, tables.values)}
+
+    @property
+    def busy(self) -> bool:
+        """True while a worker makes what ``update`` will bring."""
+        return False
+
+    def follow(self, scene: Scene) -> bool:
+        """Take the lamps and the world of ``scene``: at once where the technique does it on the GPU, else on a worker, whose light
+        comes with ``update``. False if this light cannot fit the scene any more; ``error`` then says why."""
+        raise NotImplementedError
+
+    def update(self) -> bool:
+        """Take over what a worker has finished since the last call; True if that changed the light."""
+        return False
+
+    def close(self) -> None:
+        """Let go of workers."""
+
+
+def irradiance(light, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Irradiance (n, 3) float32 [W·m⁻²] of ``light`` (an indirect_pass.Indirect) at ``points`` (n, 3) with unit ``normals``
+    (n, 3), as the GPU has it."""
+    n = len(points)
+    width = max(min(n, 1024), 1)
+    receivers = np.zeros((2, max(-(-n // width), 1) * width, 4), np.float32)
+    receivers[0, :n, :3], receivers[1, :n, :3] = points, normals
+    position, normal = (upload(rows.reshape(-1, width, 4)) for rows in receivers)
+    target = empty(width, position.height)
+    draw_indirect(light, {"position": position, "normal": normal}, target)
+    return download(target).reshape(-1, 4)[:n, :3].copy()

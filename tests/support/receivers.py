@@ -1,0 +1,28 @@
+"""Irradiance functions of the preview at receivers, against numpy."""
+
+import time
+
+import numpy as np
+
+
+def error(made, expected, points, normals):
+    """Largest difference of a channel at each receiver (n,) between ``made`` (an Indirect) and ``expected`` (n, 3), in shares of
+    the largest irradiance."""
+    from rtgi_addon.preview.indirect.base import irradiance
+    found = irradiance(made, points, normals)
+    assert np.isfinite(found).all() and (found >= 0).all() and expected.max() > 0
+    return np.abs(found - expected).max(axis=1) / expected.max()
+
+
+def relative_error(made, field, points, normals):
+    """``error`` against ``field.irradiance``."""
+    return error(made, field.irradiance(points, normals), points, normals)
+
+
+def waited(made, seconds=60.0):
+    """Whether ``made`` took over anything once its worker had come to rest."""
+    changed, until = False, time.monotonic() + seconds
+    while made.busy and time.monotonic() < until:
+        changed |= made.update()
+        time.sleep(0.01)
+    return made.update() or changed
