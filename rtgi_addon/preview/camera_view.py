@@ -39,10 +39,10 @@ class CameraView:
         return other is not None and np.array_equal(self.world_from_camera, other.world_from_camera) and np.array_equal(
             self.clip_from_camera, other.clip_from_camera)
 
-    def drawn(self, size: tuple[int, int], offset=(0.0, 0.0)) -> View:
-        """The view to draw ``size`` (width, height) pixels with, shifted by ``offset`` (2,) pixels."""
+    def drawn(self, size: tuple[int, int], offset=(0.0, 0.0), seed: int = 0) -> View:
+        """The view to draw ``size`` (width, height) pixels with, shifted by ``offset`` (2,) pixels; ``seed`` as in View."""
         clip_from_world = self._shifted(size, offset) @ np.linalg.inv(np.asarray(self.world_from_camera, np.float64))
-        return View(clip_from_world, np.asarray(self.world_from_camera, np.float64), self.depths[1], self.orthographic)
+        return View(clip_from_world, np.asarray(self.world_from_camera, np.float64), self.depths[1], self.orthographic, seed)
 
     def rays(self, size: tuple[int, int], offset=(0.0, 0.0)) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """World directions as an affine map of the picture's (x, y) in [0, 1]², y up: base + x·across + y·up, (3,) each, not unit."""

@@ -27,10 +27,11 @@ class GBuffer:
         """The targets by name."""
         return dict(zip(OUTPUTS, self._target.colors, strict=True))
 
-    def draw(self, surfaces: SurfacePass, view: View) -> None:
-        """Fill the targets; backs of materials that cull them are left out."""
+    def draw(self, surfaces: SurfacePass | None, view: View) -> None:
+        """Fill the targets, with nothing for None; backs of materials that cull them are left out."""
         with self._target.drawing():
-            surfaces.draw(view, cull=True)
+            if surfaces is not None:
+                surfaces.draw(view, cull=True)
 
 
 def gbuffer_surfaces(scene: Scene, images: Images | None = None) -> SurfacePass:

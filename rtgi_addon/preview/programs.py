@@ -89,3 +89,33 @@ VPL_GATHER = Program(
     "vpl_gather", uniforms=(("parameters", UniformStruct("VplGatherParameters", (
         ("int", "count"), ("int", "first_row"), ("int", "lights"), ("int", "has_visibility"), ("float", "clamp_at")))),),
     samplers=("receivers", "lights", "visibility"), local_size=_GROUP, images=(Image("irradiance", access="READ_WRITE"),))
+
+LAMP = UniformStruct("LampPoint", (
+    ("int", "kind"), ("int", "soft_falloff"), ("int", "ellipse"), ("float", "radius"), ("vec3", "position"),
+    ("float", "cos_half_cone"), ("vec3", "shift"), ("float", "inverse_blend"), ("vec3", "axis"), ("float", "tan_half_spread"),
+    ("vec3", "strength"), ("float", "spread_gain"), ("mat4", "local_from_world"), ("mat4", "beam"),
+))
+SHADOW = UniformStruct("ShadowMap", (
+    ("mat4", "clip_from_world"), ("vec3", "position_world"), ("float", "texel"), ("vec3", "forward_world"), ("int", "orthographic"),
+    ("vec3", "ray_base"), ("int", "outside_lit"), ("vec3", "ray_x"), ("int", "casts_shadow"), ("vec3", "ray_y"),
+    # The range of the camera's depth [m] that the map is for.
+    ("float", "camera_near"), ("float", "camera_far"),
+))
+CAMERA = UniformStruct("CameraFrame", (
+    ("vec3", "position_world"), ("int", "orthographic"), ("vec3", "forward_world"), ("ivec2", "size"),
+))
+FILM_FRAME = UniformStruct("FilmFrame", (
+    ("ivec2", "size"), ("int", "kind"), ("float", "weight"), ("vec3", "position_world"), ("int", "transparent_world"),
+    ("vec3", "forward_world"), ("vec3", "ray_base"), ("vec3", "ray_across"), ("vec3", "ray_up"), ("mat4", "map_from_world"),
+))
+
+DIRECT_LIGHT = Program(
+    "direct_light", uniforms=(("lamp", LAMP), ("shadow", SHADOW), ("camera", CAMERA)),
+    samplers=("shadow_map", *(f"gbuffer_{name}" for name in ("position", "normal", "albedo", "geometry"))),
+    images=(Image("direct", access="READ_WRITE"),), local_size=_GROUP)
+
+FILM = Program(
+    "film", uniforms=(("film", FILM_FRAME),),
+    samplers=("world", "direct_radiance", "indirect_irradiance",
+              *(f"gbuffer_{name}" for name in ("position", "normal", "albedo", "emission"))),
+    images=(Image("mean", access="READ_WRITE"),), local_size=_GROUP)

@@ -1,0 +1,35 @@
+// Adds the light of one lamp, as far as one of its shadow maps sees the pixels.
+#include "include/lamp.glsl"
+#include "include/shadow.glsl"
+#include "include/brdf.glsl"
+
+void main()
+{
+  ivec2 texel = ivec2(gl_GlobalInvocationID.xy);
+  if (any(greaterThanEqual(texel, camera.size))) {
+    return;
+  }
+  vec3 normal = texelFetch(gbuffer_normal, texel, 0).xyz;
+  if (dot(normal, normal) == 0.0) {
+    return;
+  }
+  vec3 point = texelFetch(gbuffer_position, texel, 0).xyz;
+  vec3 towards_eye = camera.orthographic != 0 ? -camera.forward_world : camera.position_world - point;
+  float depth = dot(point - camera.position_world, camera.forward_world);
+  if (depth < shadow.camera_near || depth >= shadow.camera_far) {
+    return;
+  }
+  LampLight light = lamp_light(point);
+  vec3 geometric = texelFetch(gbuffer_geometry, texel, 0).xyz;
+  float cosine = dot(normal, light.direction);
+  if (cosine <= 0.0 || dot(geometric, light.direction) <= 0.0 || light.irradiance == vec3(0.0)) {
+    return;
+  }
+  float visible = shadow.casts_shadow != 0 ? shadow_visibility(point, geometric) : 1.0;
+  if (visible <= 0.0) {
+    return;
+  }
+  vec3 reflected = reflectance(surface_at(texel), normal, normalize(towards_eye), light.direction);
+  vec4 sum = imageLoad(direct, texel);
+  imageStore(direct, texel, sum + vec4(reflected * light.irradiance * (cosine * visible), 0.0));
+}
