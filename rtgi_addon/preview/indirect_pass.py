@@ -37,6 +37,16 @@ class Indirect(Protocol):
         """Take in that ``scene`` has changed (lamps moved, the world turned) as far as the technique can without a new bake; what
         of it runs on the GPU runs here. False if its light does not fit the scene any more."""
 
+    @property
+    def busy(self) -> bool:
+        """True while a worker makes what ``update`` will bring."""
+
+    def update(self) -> bool:
+        """Take over what a worker has made since the last call; True if that changed the light."""
+
+    def close(self) -> None:
+        """Let go of workers."""
+
 
 def indirect_program(name: str, uniforms: tuple = (), samplers: tuple[str, ...] = (), defines: tuple = ()) -> Program:
     """The program of ``shaders/NAME.comp.glsl`` with the frame's resources in front of the technique's own."""
@@ -75,6 +85,18 @@ class WorldLight:
         self._cosine_sh = np.zeros((9, 4), np.float32)
         self._cosine_sh[:, :3] = sh.cosine_coefficients(2)[:, None] * world_sh(scene.world, 2)
         return True
+
+    @property
+    def busy(self) -> bool:
+        """See Indirect."""
+        return False
+
+    def update(self) -> bool:
+        """See Indirect."""
+        return False
+
+    def close(self) -> None:
+        """See Indirect."""
 
 
 def world_sh(world: World, order: int) -> np.ndarray:

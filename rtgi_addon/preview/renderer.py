@@ -10,7 +10,8 @@ from .camera_view import CameraView
 from .device import dispatch
 from .film import Background, Film
 from .gbuffer import GBuffer, gbuffer_surfaces
-from .indirect_pass import Indirect, WorldLight, draw_indirect
+from .indirect import make_indirect
+from .indirect_pass import Indirect, draw_indirect
 from .lamp_sample import sample_lamp
 from .materials import Images
 from .pixel_filter import filter_offset
@@ -38,7 +39,7 @@ class PreviewRenderer:
         self._surfaces = _surfaces(scene, self._images)
         self._bounds = scene_bounds(scene)
         self._background = Background(scene.world)
-        self._indirect: Indirect = WorldLight(scene)
+        self._indirect: Indirect = make_indirect(field, scene)
         self._gbuffer: GBuffer | None = None
         self._film: Film | None = None
         self._shadow_map: ShadowMap | None = None
@@ -48,6 +49,11 @@ class PreviewRenderer:
     def samples(self) -> int:
         """How many frames the picture is the mean of."""
         return 0 if self._film is None else self._film.samples
+
+    @property
+    def busy(self) -> bool:
+        """True while a worker makes light that a later frame will begin anew with."""
+        return self._indirect.busy
 
     @property
     def size(self) -> tuple[int, int]:
@@ -91,6 +97,8 @@ class PreviewRenderer:
         scaled = tuple(max(1, round(side * self.settings.resolution_scale)) for side in size)
         if self._film is None or self._film.size != scaled:
             self._allocate(scaled)
+        if self._indirect.update():
+            self.reset()
         if not view.equals(self._view):
             self._view = view
             self.reset()
