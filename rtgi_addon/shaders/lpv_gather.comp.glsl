@@ -10,8 +10,10 @@ void main()
   if (index < 0) {
     return;
   }
+  LpvVolume volume = LpvVolume(parameters.resolution, parameters.columns, ivec2(0), parameters.total, parameters.along,
+                               parameters.surface_cells, parameters.behind, parameters.dampening != 0);
   vec4 cells = list_texel(receivers, index, 2, 0);
   vec3 normal = list_texel(receivers, index, 2, 1).xyz;
   vec4 sum = imageLoad(irradiance, place);
-  imageStore(irradiance, place, sum + vec4(cells.w * lpv_irradiance(cells.xyz, normal), 0.0));
+  imageStore(irradiance, place, sum + vec4(cells.w * lpv_irradiance(volume, cells.xyz, normal), 0.0));
 }

@@ -7,7 +7,7 @@ import pytest
 import room_scenes as rooms
 import scene_builders as build
 from probe_bakes import QUICK, bake
-from receivers import error, relative_error, waited
+from receivers import directions, error, points_in, relative_error, waited
 
 from rtgi_addon.scene import ProbeVolume
 from rtgi_addon.techniques.probes.field import ProbeField
@@ -28,11 +28,8 @@ def agrees(indirect, field, points, normals):
     return np.quantile(found, 0.99) < TYPICAL and found.max() < WORST
 
 
-def receivers_in(half_size, count=3000, seed=0):
-    rng = np.random.default_rng(seed)
-    normals = rng.normal(size=(count, 3))
-    return (((rng.random((count, 3)) * 2 - 1) * half_size).astype(np.float32),
-            (normals / np.linalg.norm(normals, axis=1, keepdims=True)).astype(np.float32))
+def receivers_in(half_size, count=3000):
+    return points_in(half_size, count), directions(count)
 
 
 def rotated(volume, resolution, angle=0.4, center=(0.2, -0.1, 0.0), scale=(0.5, 0.3, 0.6)):

@@ -26,3 +26,14 @@ def waited(made, seconds=60.0):
         changed |= made.update()
         time.sleep(0.01)
     return made.update() or changed
+
+
+def points_in(half_size, count, seed=0):
+    """Random points (n, 3) float32 in the box [−half_size, half_size]."""
+    return ((np.random.default_rng(seed).random((count, 3)) * 2 - 1) * half_size).astype(np.float32)
+
+
+def directions(count, seed=1):
+    """Random unit vectors (n, 3) float32."""
+    vectors = np.random.default_rng(seed).normal(size=(count, 3))
+    return (vectors / np.linalg.norm(vectors, axis=1, keepdims=True)).astype(np.float32)

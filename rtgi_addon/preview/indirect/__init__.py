@@ -12,14 +12,18 @@ def make_indirect(field: Field | None, scene: Scene):
     """The indirect light (indirect_pass.Indirect) of ``field`` as baked from ``scene``: the technique's own function, or that of
     its probe grids where it has none. Without a field it is the world's, with nothing in its way. GPU objects: main thread only."""
     # Imported late: hosts without Blender's GPU use the tables of this package.
+    from ...techniques.lpv.field import LpvField
     from ...techniques.probes.field import ProbeField
     from ..indirect_pass import WorldLight
+    from .lpv import lpv_tables
     from .probes import probe_tables
     from .relighting import RelitLight
     if field is None:
         return WorldLight(scene)
     if isinstance(field, ProbeField):
         return RelitLight(field, probe_tables)
+    if isinstance(field, LpvField):
+        return RelitLight(field, lpv_tables)
     return RelitLight(field, grid_tables)
 
 

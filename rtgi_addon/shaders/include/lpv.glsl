@@ -2,6 +2,19 @@
 // the volume's corner: cell i reaches from i to i + 1.
 #include "include/volume.glsl"
 
+// Where a volume's light stands in textures of a colour channel each, and what takes coefficients 0 and 1 to 3 to irradiance.
+struct LpvVolume {
+  ivec3 resolution;
+  int columns;
+  ivec2 first_texel;
+  float total;
+  float along;
+  // How far in front of a surface its light is taken, and when a cell lies behind a plane, in cells.
+  float surface_cells;
+  float behind;
+  bool dampening;
+};
+
 struct LpvCell {
   vec4 red;
   vec4 green;
@@ -9,9 +22,9 @@ struct LpvCell {
 };
 
 // Trilinear between cells' centres, without those that lie behind the plane through `base` with `normal`.
-LpvCell lpv_sample(vec3 cells, vec3 base, vec3 normal)
+LpvCell lpv_sample(LpvVolume volume, vec3 cells, vec3 base, vec3 normal)
 {
-  ivec3 last = parameters.resolution - 1;
+  ivec3 last = volume.resolution - 1;
   vec3 position = clamp(cells - 0.5, vec3(0.0), vec3(last));
   ivec3 low = min(ivec3(floor(position)), max(last - 1, ivec3(0)));
   vec3 f = position - vec3(low);
@@ -23,12 +36,12 @@ LpvCell lpv_sample(vec3 cells, vec3 base, vec3 normal)
   for (int corner = 0; corner < 8; corner++) {
     ivec3 step = ivec3(corner & 1, corner >> 1 & 1, corner >> 2);
     ivec3 cell = min(low + step, last);
-    if (dot(vec3(cell) + 0.5 - base, normal) <= -parameters.behind) {
+    if (dot(vec3(cell) + 0.5 - base, normal) <= -volume.behind) {
       continue;
     }
     vec3 along = mix(1.0 - f, f, vec3(step));
     float weight = along.x * along.y * along.z;
-    ivec2 texel = atlas_texel(cell, parameters.resolution, parameters.columns);
+    ivec2 texel = volume.first_texel + atlas_texel(cell, volume.resolution, volume.columns);
     total += weight;
     result.red += weight * texelFetch(light_red, texel, 0);
     result.green += weight * texelFetch(light_green, texel, 0);
@@ -42,20 +55,20 @@ LpvCell lpv_sample(vec3 cells, vec3 base, vec3 normal)
 }
 
 // Irradiance of the light that stands `distance` cells in front of the surface.
-vec3 lpv_irradiance_at(vec3 base, vec3 normal, float distance)
+vec3 lpv_irradiance_at(LpvVolume volume, vec3 base, vec3 normal, float distance)
 {
-  LpvCell cell = lpv_sample(base + distance * normal, base, normal);
-  vec3 total = parameters.total * vec3(cell.red.x, cell.green.x, cell.blue.x);
+  LpvCell cell = lpv_sample(volume, base + distance * normal, base, normal);
+  vec3 total = volume.total * vec3(cell.red.x, cell.green.x, cell.blue.x);
   // Coefficients stand in the order 1, y, z, x.
-  vec3 away = parameters.along * vec3(dot(cell.red.yzw, normal.yzx), dot(cell.green.yzw, normal.yzx), dot(cell.blue.yzw, normal.yzx));
+  vec3 away = volume.along * vec3(dot(cell.red.yzw, normal.yzx), dot(cell.green.yzw, normal.yzx), dot(cell.blue.yzw, normal.yzx));
   return max(total - away, 0.0);
 }
 
-vec3 lpv_irradiance(vec3 base, vec3 normal)
+vec3 lpv_irradiance(LpvVolume volume, vec3 base, vec3 normal)
 {
-  vec3 irradiance = lpv_irradiance_at(base, normal, parameters.surface_cells);
-  if (parameters.dampening != 0) {
-    vec3 farther = lpv_irradiance_at(base, normal, parameters.surface_cells + 1.0);
+  vec3 irradiance = lpv_irradiance_at(volume, base, normal, volume.surface_cells);
+  if (volume.dampening) {
+    vec3 farther = lpv_irradiance_at(volume, base, normal, volume.surface_cells + 1.0);
     vec3 ratio = min(farther / max(irradiance, 1e-30), 1.0);
     irradiance *= ratio * ratio;
   }

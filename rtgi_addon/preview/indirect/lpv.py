@@ -1,0 +1,53 @@
+"""Tables of light propagation volumes for include/irradiance_lpv.glsl, the twin of techniques/lpv/gather.py, ``gather``."""
+
+import numpy as np
+
+from ...techniques.lpv.cascades import BLEND_CELLS
+from ...techniques.lpv.field import LpvField
+from ...techniques.lpv.gather import BEHIND_CELLS, FACE_AHEAD, FACE_TOTAL, SURFACE_CELLS
+from ...techniques.lpv.grid import LpvGrid
+from ..atlas import Atlas
+from ..uniforms import UniformStruct
+from .tables import Tables
+
+CHANNELS = ("red", "green", "blue")
+
+
+class Stack:
+    """The atlases of ``grids`` one above the other in textures of one size: ``rows`` are those that each begins with."""
+
+    def __init__(self, grids: tuple[LpvGrid, ...]):
+        self.atlases = tuple(Atlas.of(grid.resolution) for grid in grids)
+        self.rows = tuple(int(row) for row in np.cumsum([0, *(atlas.size[1] for atlas in self.atlases[:-1])]))
+        self.size = max(atlas.size[0] for atlas in self.atlases), sum(atlas.size[1] for atlas in self.atlases)
+
+
+def lpv_struct(cascades: int) -> UniformStruct:
+    """The functions' uniforms for so many cascades."""
+    return UniformStruct("LpvCascades", (
+        ("vec4", "corner", cascades), ("ivec4", "resolution", cascades), ("vec4", "factors", cascades),
+        ("float", "surface_cells"), ("float", "behind"), ("float", "blend_cells"), ("int", "dampening")))
+
+
+def lpv_values(grids: tuple[LpvGrid, ...], stack: Stack, dampening: bool) -> dict:
+    """Values of ``lpv_struct``."""
+    # Factors of coefficients 0 and 1 to 3: SH constants, the faces' solid angles, over the area of a face.
+    total, along = np.sqrt(0.25 / np.pi) * FACE_TOTAL, np.sqrt(0.75 / np.pi) * FACE_AHEAD
+    return {
+        "corner": [(*grid.corner, grid.cell) for grid in grids],
+        "resolution": [(*grid.resolution, atlas.columns) for grid, atlas in zip(grids, stack.atlases, strict=True)],
+        "factors": [(total / grid.cell**2, along / grid.cell**2, row, 0.0) for grid, row in zip(grids, stack.rows, strict=True)],
+        "surface_cells": SURFACE_CELLS, "behind": BEHIND_CELLS, "blend_cells": BLEND_CELLS, "dampening": int(dampening),
+    }
+
+
+def lpv_tables(field: LpvField) -> Tables:
+    """The accumulated volumes of ``field``."""
+    grids, stack = field.volume_grids, Stack(field.volume_grids)
+    light = np.zeros((3, stack.size[1], stack.size[0], 4), np.float32)
+    for volume, atlas, row in zip(field.volumes, stack.atlases, stack.rows, strict=True):
+        for channel in range(3):
+            light[channel, row:row + atlas.size[1], :atlas.size[0]] = atlas.pack(np.moveaxis(volume[:, channel], 0, -1))
+    return Tables("indirect_lpv", lpv_struct(len(grids)), lpv_values(grids, stack, field.params.get("dampening", True)),
+                  {f"light_{name}": light[channel] for channel, name in enumerate(CHANNELS)},
+                  (("LPV_CASCADES", str(len(grids))),))
