@@ -1,0 +1,120 @@
+"""F12: one view layer as a picture, sample by sample, with its passes."""
+
+import time
+
+import numpy as np
+
+from ...errors import BakeError, Cancelled
+from ...progress import Progress
+from ...scene import Camera
+from ..extract import extract_scene
+from ..extract.cameras import read_camera
+from ..preview_settings import preview_settings
+from .passes import add_passes, passes_of, write_passes
+from .shown import lit_for, shown_for
+
+# How often the picture in the making is shown [s], and the share of progress that reading and relighting take.
+_SHOW_EVERY, _READING, _RELIGHTING = 0.5, 0.1, 0.1
+
+
+def render(engine, depsgraph) -> None:
+    """Render ``depsgraph``'s view layer into ``engine``'s result. Raises BakeError, Cancelled."""
+    from ...preview.camera_view import CameraView
+    from ...preview.renderer import PreviewRenderer  # importable once there is a GPU
+    layer, original = depsgraph.view_layer, depsgraph.scene.original
+    size = _result_size(engine, layer)
+    progress = _progress(engine)
+    engine.update_stats("", "Reading the scene")
+    scene = extract_scene(depsgraph, progress=progress.span(0.0, _READING), reuse=True)
+    camera = cropped(_camera(depsgraph), depsgraph.scene.render, size)
+    shown = shown_for(original)
+    if shown.note:
+        engine.report({"INFO"}, shown.note)
+    engine.update_stats("", "Relighting")
+    field = lit_for(shown, scene, progress.span(_READING, _READING + _RELIGHTING))
+    settings = preview_settings(original, final=True)
+    renderer = PreviewRenderer(scene, field, settings, tuple(entry.source for entry in passes_of(layer)))
+    drawing = progress.span(_READING + _RELIGHTING, 1.0)
+    view, written = CameraView.of(camera), time.monotonic()
+    for sample in range(settings.samples):
+        drawing.step(sample / settings.samples, f"Sample {sample} of {settings.samples}")
+        renderer.frame(view, size)
+        if not engine.is_preview and time.monotonic() - written > _SHOW_EVERY:
+            _write(engine, layer, size, renderer)
+            written = time.monotonic()
+    _write(engine, layer, size, renderer)
+    drawing.step(1.0, "Done")
+
+
+def cropped(camera: Camera, render, size: tuple[int, int]) -> Camera:
+    """``camera`` over the border of ``render`` alone, which is ``size`` pixels; the same camera if there is no border."""
+    if not render.use_border:
+        return camera
+    width, height = camera.resolution
+    left, bottom = (_first(*side) for side in ((render.border_min_x, render.border_max_x, width, size[0]),
+                                               (render.border_min_y, render.border_max_y, height, size[1])))
+    scale = np.array([width / size[0], height / size[1]])
+    centre = np.array([left + size[0] / 2.0, bottom + size[1] / 2.0]) / (width, height) * 2.0 - 1.0
+    crop = np.diag([*scale, 1.0, 1.0])
+    crop[:2, 3] = -centre * scale
+    return Camera(camera.name, camera.world_from_camera, crop @ camera.clip_from_camera, size)
+
+
+def _first(low: float, high: float, side: int, count: int) -> int:
+    """The first of ``count`` pixels between two shares of a side: versions of Blender cut down or round."""
+    return int(low * side) if int(high * side) - int(low * side) == count else round(low * side)
+
+
+def _result_size(engine, layer) -> tuple[int, int]:
+    """Width and height [pixels] of what is to be filled: the border alone, where there is one."""
+    result = engine.begin_result(0, 0, engine.resolution_x, engine.resolution_y, layer=layer.name)
+    if result is None:
+        raise Cancelled()
+    size = result.resolution_x, result.resolution_y
+    engine.end_result(result, cancel=True)
+    return size
+
+
+def _camera(depsgraph) -> Camera:
+    active = depsgraph.scene.camera
+    if active is None:
+        raise BakeError(f"scene {depsgraph.scene.name!r} has no camera", "add one, or make one active")
+    notes: list[str] = []
+    camera = read_camera(active, depsgraph, depsgraph.scene.render, notes)
+    if camera is None:
+        raise BakeError(notes[0], "choose a perspective or orthographic lens")
+    return camera
+
+
+def _progress(engine) -> Progress:
+    """A Progress that shows in Blender's bar and stops on ESC."""
+    def report(fraction, label, _seconds_left):
+        engine.update_progress(fraction)
+        if label:
+            engine.update_stats("", label)
+
+    return _Breakable(engine, report)
+
+
+class _Breakable(Progress):
+    """Asks Blender at every step whether the user wants to stop."""
+
+    def __init__(self, engine, report):
+        super().__init__(report)
+        self._engine = engine
+
+    def check(self) -> None:
+        """See Progress."""
+        if self._engine.test_break():
+            self.cancel()
+        super().check()
+
+
+def _write(engine, layer, size: tuple[int, int], renderer) -> None:
+    add_passes(engine, layer)
+    result = engine.begin_result(0, 0, *size, layer=layer.name)
+    if result is None:
+        raise Cancelled()
+    images = {entry.source: renderer.image(entry.source) for entry in passes_of(layer)}
+    write_passes(result.layers[0], layer, images.__getitem__)
+    engine.end_result(result)

@@ -1,0 +1,60 @@
+"""What a render delivers: Blender's names for the renderer's passes, and which of them a view layer asks for."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+# What Blender's engines write as the depth of nothing.
+FAR_AWAY = 1e10
+
+
+@dataclass(frozen=True)
+class RenderPass:
+    """``name`` and ``channels`` ('RGBA', 'RGB', 'XYZ', 'Z') as Blender shows them, ``kind`` how it treats the values, ``source``
+    the renderer's pass; ``wanted`` tells whether a view layer asks for it."""
+
+    name: str
+    channels: str
+    kind: str
+    source: str
+    wanted: Callable[[object], bool]
+
+
+PASSES = (
+    RenderPass("Combined", "RGBA", "COLOR", "combined", lambda layer: True),
+    RenderPass("Depth", "Z", "VALUE", "depth", lambda layer: layer.use_pass_z),
+    RenderPass("Normal", "XYZ", "VECTOR", "normal", lambda layer: layer.use_pass_normal),
+    RenderPass("DiffCol", "RGB", "COLOR", "albedo", lambda layer: layer.use_pass_diffuse_color),
+    RenderPass("Direct", "RGB", "COLOR", "direct", lambda layer: layer.rtgi.use_direct),
+    RenderPass("Indirect", "RGB", "COLOR", "indirect", lambda layer: layer.rtgi.use_indirect),
+    RenderPass("Irradiance", "RGB", "COLOR", "irradiance", lambda layer: layer.rtgi.use_irradiance),
+)
+# Those that every engine's result has without being asked.
+_BUILT_IN = {"Combined"}
+
+
+def passes_of(layer) -> list[RenderPass]:
+    """The passes that a view layer asks for."""
+    return [entry for entry in PASSES if entry.wanted(layer)]
+
+
+def register_passes(engine, scene, layer) -> None:
+    """Tell Blender's compositor which sockets a view layer has (RenderEngine.update_render_passes)."""
+    for entry in passes_of(layer):
+        engine.register_pass(scene, layer, entry.name, len(entry.channels), entry.channels, entry.kind)
+
+
+def add_passes(engine, layer) -> None:
+    """Add the passes to the result that is about to begin."""
+    for entry in passes_of(layer):
+        if entry.name not in _BUILT_IN:
+            engine.add_pass(entry.name, len(entry.channels), entry.channels, layer=layer.name)
+
+
+def write_passes(result_layer, layer, images: Callable[[str], np.ndarray]) -> None:
+    """Fill a begun result's layer from ``images``: pass name → (h, w, 4) float32, row 0 at the bottom."""
+    for entry in passes_of(layer):
+        pixels = images(entry.source)
+        target = result_layer.passes.find_by_name(entry.name, "")
+        target.rect.foreach_set(np.ascontiguousarray(pixels[..., :target.channels], np.float32).ravel())
