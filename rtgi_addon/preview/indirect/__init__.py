@@ -4,26 +4,37 @@
 `shaders/include/irradiance_*.glsl`, each the twin of its ``Field.irradiance``.
 """
 
+from functools import partial
+
 from ...scene import Scene
 from ...techniques.base import Field
 
 
-def make_indirect(field: Field | None, scene: Scene):
+def make_indirect(field: Field | None, scene: Scene, *, samples: int | None = None):
     """The indirect light (indirect_pass.Indirect) of ``field`` as baked from ``scene``: the technique's own function, or that of
-    its probe grids where it has none. Without a field it is the world's, with nothing in its way. GPU objects: main thread only."""
+    its probe grids where it has none. Without a field it is the world's, with nothing in its way.
+
+    ``samples`` replaces the number that a technique which samples reads at each receiver: frames that are averaged need few. GPU
+    objects: main thread only.
+    """
     # Imported late: hosts without Blender's GPU use the tables of this package.
     from ...techniques.lpv.field import LpvField
     from ...techniques.probes.field import ProbeField
+    from ...techniques.rsm.field import RsmField
     from ..indirect_pass import WorldLight
     from .lpv import lpv_tables
     from .probes import probe_tables
     from .relighting import RelitLight
+    from .rsm import rsm_tables
     if field is None:
         return WorldLight(scene)
     if isinstance(field, ProbeField):
         return RelitLight(field, probe_tables)
     if isinstance(field, LpvField):
         return RelitLight(field, lpv_tables)
+    # Shadow rays are not for a shader: the grids have seen them.
+    if isinstance(field, RsmField) and not field.capture.settings.visibility:
+        return RelitLight(field, partial(rsm_tables, samples=samples))
     return RelitLight(field, grid_tables)
 
 

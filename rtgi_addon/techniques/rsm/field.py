@@ -22,22 +22,23 @@ TEXEL_BYTES, MAX_BYTES = 96, 4 << 30
 
 
 class LampMaps:
-    """The maps of all lamps under one set of settings, and the gather from them."""
+    """The maps of all lamps under one set of settings, and the gather from them: ``prepared`` are those that hold light, read by
+    ``pattern``."""
 
     def __init__(self, context: LightContext, settings: RsmSettings, maps: tuple[ReflectiveShadowMap, ...], seed: int,
                  kernels: Kernels):
         self.context, self.settings, self.maps, self._kernels = context, settings, maps, kernels
-        self._prepared = prepare(maps, settings.samples)
-        self._pattern = Pattern(settings.samples, settings.disk_radius, settings.disk_share, seed)
+        self.prepared = prepare(maps, settings.samples)
+        self.pattern = Pattern(settings.samples, settings.disk_radius, settings.disk_share, seed)
         self._tracer = context.tracer if settings.visibility else None
 
     def irradiance(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """(n, 3) float32 [W·m⁻²]."""
         if self.settings.every_texel:
-            return gather_every_texel(self._prepared, points, normals, tracer=self._tracer, threads=self.context.threads)
+            return gather_every_texel(self.prepared, points, normals, tracer=self._tracer, threads=self.context.threads)
         if self._on_device:
-            return self._kernels.rsm_gather(self._prepared, points, normals, self._pattern)
-        return gather(self._prepared, points, normals, self._pattern, tracer=self._tracer, threads=self.context.threads)
+            return self._kernels.rsm_gather(self.prepared, points, normals, self.pattern)
+        return gather(self.prepared, points, normals, self.pattern, tracer=self._tracer, threads=self.context.threads)
 
     def radiance_sh(self, progress: Progress):
         """SH of incident radiance as ``resample`` takes it; None where a device that knows irradiance alone is to do the work.
@@ -46,8 +47,8 @@ class LampMaps:
             return None
         options = {"tracer": self._tracer, "threads": self.context.threads, "progress": progress}
         if self.settings.every_texel:
-            return lambda points: gather_every_texel(self._prepared, points, None, order=self.settings.order, **options)
-        return lambda points: gather_sh(self._prepared, points, self.settings.order, self._pattern, **options)
+            return lambda points: gather_every_texel(self.prepared, points, None, order=self.settings.order, **options)
+        return lambda points: gather_sh(self.prepared, points, self.settings.order, self.pattern, **options)
 
     @property
     def _on_device(self) -> bool:
@@ -126,13 +127,13 @@ class Capture:
 class RsmField(Field):
     """The first bounce of all lamps of a scene, and nothing else.
 
-    ``maps`` are its reflective shadow maps. The field keeps the scene's rays to be relit, and to test visibility if it does.
+    ``maps`` are its reflective shadow maps. The field keeps what ``capture`` needs to be relit, and to test visibility if it does.
     """
 
     technique = "rsm"
 
     def __init__(self, capture: Capture, lamp_maps: LampMaps, grids: tuple[ProbeGrid, ...] = ()):
-        self._capture, self._lamp_maps, self._grids = capture, lamp_maps, grids
+        self.capture, self._lamp_maps, self._grids = capture, lamp_maps, grids
         self.params = {**asdict(capture.settings), "bounces": 1, "light": "lamps"}
         maps, lights = lamp_maps.maps, capture.context.scene.lights
         dark = [light.name for lamp, light in enumerate(lights)
@@ -145,6 +146,11 @@ class RsmField(Field):
     def maps(self) -> tuple[ReflectiveShadowMap, ...]:
         """The maps of all lamps, lamp after lamp."""
         return self._lamp_maps.maps
+
+    @property
+    def pattern(self) -> Pattern:
+        """How receivers choose texels."""
+        return self._lamp_maps.pattern
 
     def irradiance(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """Irradiance (n, 3) float32 [W·m⁻²] at ``points`` (n, 3) with unit ``normals`` (n, 3), world space; never negative."""
@@ -159,7 +165,7 @@ class RsmField(Field):
 
         Raises BakeError if geometry or materials are not those of the bake, or no lamp lights anything.
         """
-        return replace(self._capture, context=self._capture.context.relit(scene)).field(progress or Progress())
+        return replace(self.capture, context=self.capture.context.relit(scene)).field(progress or Progress())
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Every map's arrays, and its view as JSON text."""

@@ -1,0 +1,63 @@
+"""Tables of reflective shadow maps for include/irradiance_rsm.glsl, the twin of techniques/rsm/gather.py, ``gather``."""
+
+import numpy as np
+
+from ...numerics.sampling import hash_u32
+from ...techniques.rsm.field import RsmField
+from ...techniques.rsm.gather import Pattern, prepare
+from ...transport.shadow_views import ShadowView
+from ..packing import fold, map_texels
+from ..uniforms import UniformStruct
+from .tables import Tables
+
+STRUCT = UniformStruct("RsmMaps", (("int", "count"), ("uint", "seed_state"), ("float", "disk_radius")))
+# The widest sheet of maps: one of three texels for each of the maps' is within every GPU's limit.
+_SHEET_WIDTH = 16384 // 3
+
+
+class Sheet:
+    """Square maps of ``sizes`` [texels] on one sheet, in shelves: ``places`` are the lowest corners (x, y), ``size`` the sheet's."""
+
+    def __init__(self, sizes: list[int]):
+        self.places: list[tuple[int, int]] = []
+        x = y = shelf = width = 0
+        for size in sizes:
+            if x and x + size > _SHEET_WIDTH:
+                x, y, shelf = 0, y + shelf, 0
+            self.places.append((x, y))
+            x, shelf, width = x + size, max(shelf, size), max(width, x + size)
+        self.size = max(width, 1), max(y + shelf, 1)
+
+
+def rsm_tables(field: RsmField, samples: int | None = None) -> Tables:
+    """The maps of ``field``, sampled as it does, or with ``samples`` texels a lamp."""
+    pattern = field.pattern if samples is None else Pattern(samples, field.pattern.disk_radius, field.pattern.disk_share,
+                                                            field.pattern.seed)
+    maps = prepare(field.maps, pattern.samples)
+    sheet = Sheet([item.view.resolution for item in maps])
+    width, height = sheet.size
+    texels, cumulative = np.zeros((height, 3 * width, 4), np.float32), np.zeros((height, width), np.float32)
+    for item, (x, y) in zip(maps, sheet.places, strict=True):
+        size = item.view.resolution
+        texels[y:y + size, 3 * x:3 * (x + size)] = map_texels(item)
+        cumulative[y:y + size, x:x + size] = item.cumulative.reshape(size, size)
+    parts = [item.places(pattern) for item in maps]
+    return Tables("indirect_rsm", STRUCT, rsm_values(len(maps), pattern),
+                  {"texels": texels, "cumulative": cumulative, "maps": map_rows([item.view for item in maps], sheet, parts),
+                   "pattern": fold(np.concatenate([np.zeros((0, 2), np.float32), *(part for pair in parts for part in pair)]))})
+
+
+def rsm_values(count: int, pattern: Pattern) -> dict:
+    """Values of STRUCT for so many maps."""
+    return {"count": count, "seed_state": int(hash_u32(pattern.seed)), "disk_radius": pattern.disk_radius}
+
+
+def map_rows(views: list[ShadowView], sheet: Sheet, parts: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+    """Texels of the list of maps: where each lies on the sheet, and which of the pattern's points it takes (``GatherMap.places``)."""
+    rows, first = np.zeros((max(len(views), 1), 5, 4), np.float32), 0
+    for number, (view, place, (disk, flux)) in enumerate(zip(views, sheet.places, parts, strict=True)):
+        rows[number, :3] = view.clip_from_world[[0, 1, 3]]
+        rows[number, 3] = view.resolution, *place, first
+        rows[number, 4, :2] = len(disk), len(flux)
+        first += len(disk) + len(flux)
+    return fold(rows.reshape(len(rows), -1))

@@ -1,0 +1,2 @@
+#include "include/irradiance_rsm.glsl"
+#include "include/indirect_frame.glsl"

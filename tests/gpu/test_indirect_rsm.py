@@ -1,0 +1,72 @@
+"""The irradiance function of reflective shadow maps on the GPU against ``RsmField.irradiance``, relative to the largest irradiance,
+and maps that are captured there when a lamp moves."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scene_builders as build
+from receivers import directions, points_in, relative_error
+
+from rtgi_addon.progress import Progress
+from rtgi_addon.scene import SunLight
+from rtgi_addon.techniques.rsm import TECHNIQUE, RsmSettings
+
+# Float sums in another order. A sample on the border of two texels may fall either way: one of some hundred, in few receivers.
+TYPICAL, WORST = 2e-5, 0.03
+QUICK = {"resolution": 96, "order": 1}
+BOX = build.closed_box(albedo=0.6, light_position=(0.2, -0.3, 0.4))
+SUN = SunLight("sun", np.float32([0.6, 0.0, -0.8]), np.float32([3.0, 2.0, 1.0]), angle=0.0)
+
+
+@pytest.fixture(scope="module")
+def indirect(gpu_device):
+    from rtgi_addon.preview import indirect
+    return indirect
+
+
+def bake(scene, **settings):
+    return TECHNIQUE.bake(scene, RsmSettings(**(QUICK | settings)), np.random.default_rng(0), Progress())
+
+
+def lit_by(*lights):
+    return replace(build.open_plane(world=0.0, half_size=3.0), lights=lights)
+
+
+@pytest.mark.parametrize("disk_share", [0.0, 0.4, 1.0])
+def test_a_cube_of_maps(indirect, disk_share):
+    field = bake(BOX, disk_share=disk_share)
+    found = relative_error(indirect.make_indirect(field, BOX), field, points_in(0.95, 2000), directions(2000))
+    assert np.quantile(found, 0.98) < TYPICAL and found.max() < WORST
+
+
+def test_maps_of_several_lamps_and_sizes(indirect):
+    scene = lit_by(SUN, build.point_light((0.5, 0.0, 1.0)), build.point_light((20.0, 0.0, 30.0), 50.0))
+    field = bake(scene)
+    assert len({item.view.resolution for item in field.maps}) > 1
+    points = points_in(2.0, 2000) + np.float32([0, 0, 2.1])
+    found = relative_error(indirect.make_indirect(field, scene), field, points, directions(2000))
+    assert np.quantile(found, 0.98) < TYPICAL and found.max() < WORST
+
+
+def test_fewer_samples_have_the_same_mean(indirect):
+    field = bake(BOX)
+    points, normals = points_in(0.9, 4000), directions(4000)
+    made = indirect.make_indirect(field, BOX, samples=32)
+    from rtgi_addon.preview.indirect.base import irradiance
+    found, expected = irradiance(made, points, normals), field.irradiance(points, normals)
+    assert not np.allclose(found, expected, rtol=1e-3)
+    assert found.mean() == pytest.approx(expected.mean(), rel=0.02)
+
+
+def test_shadow_rays_are_left_to_the_grids(indirect):
+    field = bake(BOX, visibility=True, resolution=32, samples=64)
+    made = indirect.make_indirect(field, BOX)
+    assert made.program.name == "indirect_probes"
+
+
+def test_more_maps_than_a_row_of_the_sheet_holds():
+    from rtgi_addon.preview.indirect.rsm import Sheet
+    sheet = Sheet([2048, 1024, 2048, 512, 2048, 2048])
+    assert sheet.places == [(0, 0), (2048, 0), (3072, 0), (0, 2048), (512, 2048), (2560, 2048)]
+    assert sheet.size == (5120, 4096)
