@@ -10,8 +10,8 @@ from .surfaces import View
 
 @dataclass(frozen=True, eq=False)
 class CameraView:
-    """``world_from_camera`` (4, 4) rigid, looking along −Z with +Y up; ``clip_from_camera`` (4, 4) an OpenGL projection, perspective
-    or orthographic: a viewport's ``view_matrix.inverted()`` and ``window_matrix``."""
+    """``world_from_camera`` (4, 4) rigid, looking along −Z with +Y up; ``clip_from_camera`` (4, 4) an OpenGL projection,
+    perspective or orthographic: a viewport's ``view_matrix.inverted()`` and ``window_matrix``."""
 
     world_from_camera: np.ndarray
     clip_from_camera: np.ndarray
@@ -45,7 +45,7 @@ class CameraView:
         return View(clip_from_world, np.asarray(self.world_from_camera, np.float64), self.depths[1], self.orthographic, seed)
 
     def rays(self, size: tuple[int, int], offset=(0.0, 0.0)) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """World directions as an affine map of the picture's (x, y) in [0, 1]², y up: base + x·across + y·up, (3,) each, not unit."""
+        """World directions as an affine map of the picture's (x, y) in [0, 1]²: base + x·across + y·up, (3,) each, not unit."""
         world_from_clip = np.asarray(self.world_from_camera, np.float64) @ np.linalg.inv(self._shifted(size, offset))
         ends = np.array([[(x, y, depth, 1.0) for x, y in ((-1, -1), (1, -1), (-1, 1))] for depth in (-1.0, 1.0)])
         ends = ends @ world_from_clip.T

@@ -16,7 +16,8 @@ class GBuffer:
 
     ``textures`` by name, all RGBA32F, zero where nothing is seen: ``position`` world and ``normal`` world on the side that is seen,
     with the triangle in their fourth components (`surfaces.decode_primitive`); ``albedo`` of diffuse transport and the instance's
-    index; ``base_color`` and metallic; ``emission`` [W·sr⁻¹·m⁻²] and roughness; ``geometry`` the triangle's own normal on that side.
+    index; ``base_color`` and metallic; ``emission`` [W·sr⁻¹·m⁻²] and roughness; ``geometry`` the triangle's own normal on that
+    side.
     """
 
     def __init__(self, width: int, height: int):

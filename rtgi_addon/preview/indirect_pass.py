@@ -20,8 +20,8 @@ FRAME = UniformStruct("IndirectFrame", (("ivec2", "size"),))
 
 
 class Indirect(Protocol):
-    """One technique's indirect light on the GPU: ``program`` made by ``indirect_program``, and the ``uniforms`` and ``samplers`` of the
-    names that were given to it."""
+    """One technique's indirect light on the GPU: ``program`` made by ``indirect_program``, and the ``uniforms`` and ``samplers`` of
+    the names that were given to it."""
 
     program: Program
 

@@ -94,8 +94,9 @@ def _area(light: AreaLight, u: np.ndarray):
     position = np.asarray(light.position_world, np.float64)
     collimated = row.tan_half_spread == 0
     strength = np.asarray(light.radiance, np.float64) * (np.pi if collimated else row.area)
-    uniforms = {"position": position, "shift": shift, "axis": row.normal, "strength": strength, "beam": beam, "ellipse": int(row.ellipse),
-                "tan_half_spread": min(float(row.tan_half_spread), _NO_SPREAD), "spread_gain": row.spread_gain}
+    uniforms = {"position": position, "shift": shift, "axis": row.normal, "strength": strength, "beam": beam,
+                "ellipse": int(row.ellipse), "tan_half_spread": min(float(row.tan_half_spread), _NO_SPREAD),
+                "spread_gain": row.spread_gain}
     return replace(light, position_world=position + shift), uniforms
 
 

@@ -1,11 +1,11 @@
-"""Where in a pixel, and around it, frames are sampled: in proportion to the pixel filter, so that the mean of frames is filtered."""
+"""Where in a pixel, and around it, frames are sampled: as often as the pixel filter weighs it, so that their mean is filtered."""
 
 from functools import cache
 
 import numpy as np
 
-# Blender's default: a Blackman-Harris window over this many pixels.
-WIDTH = 1.5
+# A Blackman-Harris window over this many pixels: what Cycles makes of Blender's default width of 1.5 (scene/film.cpp).
+WIDTH = 3.0
 _STEPS = 256
 
 

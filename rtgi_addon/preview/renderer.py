@@ -126,7 +126,8 @@ class PreviewRenderer:
             self._shadow_map = ShadowMap(resolution)
         size = self._film.size
         pose = np.asarray(view.world_from_camera)
-        camera = {"position_world": pose[:3, 3], "forward_world": -pose[:3, 2], "orthographic": int(view.orthographic), "size": size}
+        camera = {"position_world": pose[:3, 3], "forward_world": -pose[:3, 2], "orthographic": int(view.orthographic),
+                  "size": size}
         gbuffer = {f"gbuffer_{name}": inputs[name] for name in ("position", "normal", "albedo", "geometry")}
         for number, light in enumerate(self.scene.lights):
             sample = sample_lamp(light, _lamp_numbers(index, number))

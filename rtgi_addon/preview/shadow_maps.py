@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import gpu
 import numpy as np
@@ -59,7 +60,7 @@ def shadow_parts(sample: LampSample, camera: CameraView, bounds: np.ndarray, res
         return
     if isinstance(sample.light, SunLight):
         splits = cascade_splits(camera, bounds, cascades, jitter[2])
-        for near, far in zip(splits, splits[1:], strict=False):
+        for near, far in pairwise(splits):
             focus = _focus(camera, bounds, near, far)
             depths = (near if near > splits[0] else _EVERYWHERE[0], far if far < splits[-1] else _EVERYWHERE[1])
             for view in sample.shadow_views(bounds, resolution, focus):

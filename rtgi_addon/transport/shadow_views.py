@@ -113,7 +113,7 @@ def views_of(context, lamp: int, resolution: int = 512, *, focus: np.ndarray | N
 
 def views_of_light(light: Light, bounds: np.ndarray, resolution: int, lamp: int = 0, *, focus: np.ndarray | None = None,
                    area_points: int = 4) -> tuple[ShadowView, ...]:
-    """As ``views_of``, for a scene within ``bounds`` (2, 3) of which no more is known; a wide spot gets all the faces of its cube."""
+    """As ``views_of`` for a scene of which only ``bounds`` (2, 3) are known; a wide spot gets all the faces of its cube."""
     if not np.any(_strength(light) > 0):
         return ()
     if isinstance(light, SunLight):
