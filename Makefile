@@ -31,3 +31,9 @@ bench: setup         ## measure again what benchmarks/README.md says
 	$(PYTHON) benchmarks/bake_vs_cycles.py
 	$(PYTHON) benchmarks/relight.py
 	$(PYTHON) benchmarks/scale.py
+	$(PYTHON) benchmarks/technique_errors.py
+	$(PYTHON) benchmarks/vpl.py
+	$(PYTHON) benchmarks/lpv.py
+	$(PYTHON) benchmarks/rsm_capture.py
+	$(PYTHON) benchmarks/gpu_kernels.py
+	$(PYTHON) benchmarks/linear_cost.py

@@ -1,12 +1,12 @@
 """Instant radiosity: gather rate against bare embreex, cost by number of lights, accuracy, clamp loss, flicker of a moving lamp.
 
-    python benchmarks/vpl.py [rate linear accuracy flicker] [--samples NAME…] [--threads N] [--runs 3] [--seeds 3] [--chart]
+    python benchmarks/vpl.py [rate linear accuracy flicker] [--samples NAME…] [--threads N] [--runs 3] [--seeds 3]
 
 Each part prints a Markdown table. *rate*: LIGHTS virtual lights from the sample's own light paths times RECEIVERS points on
 surfaces, shadow rays included, against embreex on the very same rays with as many threads and nothing around them, in turn;
-pairs whose normals face away need no ray, so there are more pairs than rays. *linear*: seconds of the gather by number of lights;
-``--chart`` draws it to benchmarks/results/vpl_linear.png. *accuracy*: irradiance at surface points seen from the sample's volumes
-against the path reference; leak is the mean where the reference is dark, over the mean elsewhere. *flicker*: the first lamp of
+pairs whose normals face away need no ray, so there are more pairs than rays. *linear*: seconds of the gather by number of lights
+(`linear_cost.py` charts it beside the other techniques' costs). *accuracy*: irradiance at surface points seen from the sample's
+volumes against the path reference; leak is the mean where the reference is dark, over the mean elsewhere. *flicker*: the first lamp of
 the sample moves by 5 mm a frame; temporal standard deviation over mean of the middle receiver after a quadratic trend, for
 lights that are followed and for lights sampled afresh.
 """
@@ -179,23 +179,6 @@ def flicker(name: str, **settings) -> str:
             f"{noise(followed):.2f} % | {noise(fresh):.2f} % |")
 
 
-def chart(rows: list[tuple[int, float]]) -> None:
-    """Seconds over lights, log-log, beside a line of slope 1."""
-    import matplotlib
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-    lights, seconds = np.array(rows).T
-    plt.figure(figsize=(5, 4))
-    plt.loglog(lights, seconds, "o-", label="gather")
-    plt.loglog(lights, seconds[-1] * lights / lights[-1], "--", label="slope 1")
-    plt.xlabel("virtual lights")
-    plt.ylabel("seconds, 10,000 receivers")
-    plt.legend()
-    results = ROOT / "benchmarks/results"
-    results.mkdir(exist_ok=True)
-    plt.savefig(results / "vpl_linear.png", dpi=120, bbox_inches="tight")
-
-
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -204,7 +187,6 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=thread_count())
     parser.add_argument("--runs", type=int, default=3)
     parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument("--chart", action="store_true")
     arguments = parser.parse_args()
     parts = arguments.parts or ["rate", "linear", "accuracy", "flicker"]
     if "rate" in parts:
@@ -216,8 +198,6 @@ def main() -> None:
         print("\n| lights | seconds | per light |\n|---:|---:|---:|")
         for lights, seconds in rows:
             print(f"| {lights:,} | {seconds:.3f} | {1e6 * seconds / lights:.0f} µs |")
-        if arguments.chart:
-            chart(rows)
     if "accuracy" in parts:
         print("\n| sample | error | bias | median error | leak | clamp loss | reference's noise | bake [s] |\n"
               "|---|---:|---:|---:|---:|---:|---:|---:|")
