@@ -8,7 +8,7 @@ from .program import Program
 from .uniforms import UniformStruct
 
 PRESENT = Program(
-    "present", uniforms=(("region", UniformStruct("PresentRegion", (("ivec2", "size"), ("int", "opaque")))),),
+    "present", uniforms=(("region", UniformStruct("PresentRegion", (("ivec2", "size"),))),),
     samplers=("picture",), inputs=(("VEC2", "corner"),), outputs=(("VEC4", "color"),))
 
 # One triangle that covers the region.
