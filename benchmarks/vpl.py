@@ -3,12 +3,12 @@
     python benchmarks/vpl.py [rate linear accuracy flicker] [--samples NAME…] [--threads N] [--runs 3] [--seeds 3]
 
 Each part prints a Markdown table. *rate*: LIGHTS virtual lights from the sample's own light paths times RECEIVERS points on
-surfaces, shadow rays included, against embreex on the very same rays with as many threads and nothing around them, in turn;
-pairs whose normals face away need no ray, so there are more pairs than rays. *linear*: seconds of the gather by number of lights
+surfaces, shadow rays included, against embreex on the very same rays with as many threads and nothing around them, in turn; pairs
+whose normals face away need no ray, so there are more pairs than rays. *linear*: seconds of the gather by number of lights
 (`linear_cost.py` charts it beside the other techniques' costs). *accuracy*: irradiance at surface points seen from the sample's
-volumes against the path reference; leak is the mean where the reference is dark, over the mean elsewhere. *flicker*: the first lamp of
-the sample moves by 5 mm a frame; temporal standard deviation over mean of the middle receiver after a quadratic trend, for
-lights that are followed and for lights sampled afresh.
+volumes against the path reference; leak is the mean where the reference is dark, over the mean elsewhere. *flicker*: the first
+lamp of the sample moves by 5 mm a frame; temporal standard deviation over mean of the middle receiver after a quadratic trend,
+for lights that are followed and for lights sampled afresh.
 """
 
 import argparse
