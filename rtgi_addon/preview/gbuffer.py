@@ -5,10 +5,9 @@ import gpu
 from ..scene import Scene
 from .device import RenderTarget
 from .materials import Images
-from .programs import SURFACE_PASSES
+from .programs import OUTPUTS
 from .surfaces import SurfacePass, View
 
-OUTPUTS = SURFACE_PASSES["gbuffer"][1]
 
 
 class GBuffer:
@@ -17,7 +16,7 @@ class GBuffer:
     ``textures`` by name, all RGBA32F, zero where nothing is seen: ``position`` world and ``normal`` world on the side that is seen,
     with the triangle in their fourth components (`surfaces.decode_primitive`); ``albedo`` of diffuse transport and the instance's
     index; ``base_color`` and metallic; ``emission`` [W·sr⁻¹·m⁻²] and roughness; ``geometry`` the triangle's own normal on that
-    side.
+    side and the reflectance of its dielectric layer at normal incidence.
     """
 
     def __init__(self, width: int, height: int):

@@ -7,11 +7,11 @@ from .program import Image, Program
 from .uniforms import UniformStruct
 
 # The material inputs in the order of include/material.glsl.
-MATERIAL_INPUTS = ("albedo", "emission", "alpha", "base_color", "metallic", "roughness")
+MATERIAL_INPUTS = ("albedo", "emission", "alpha", "base_color", "metallic", "roughness", "specular")
 
 MATERIAL = UniformStruct("MaterialInputs", (
-    ("vec4", "factor", 6), ("vec4", "addend", 6), ("vec4", "uv_row_x", 6), ("vec4", "uv_row_y", 6),
-    ("ivec4", "source", 6), ("ivec4", "filtering", 6),
+    ("vec4", "factor", 7), ("vec4", "addend", 7), ("vec4", "uv_row_x", 7), ("vec4", "uv_row_y", 7),
+    ("ivec4", "source", 7), ("ivec4", "filtering", 7),
     # Alpha threshold (−1: a coin), the draw's first instance, 1 if it can be transparent.
     ("vec4", "surface"),
 ))
@@ -26,6 +26,9 @@ SURFACE_PASSES = {
     "gbuffer": (MATERIAL_INPUTS, ("position", "normal", "albedo", "base_color", "emission", "geometry")),
     "shadow": (("alpha",), ("depth",)),
 }
+
+
+OUTPUTS = SURFACE_PASSES["gbuffer"][1]
 
 
 @cache
@@ -111,7 +114,7 @@ FILM_FRAME = UniformStruct("FilmFrame", (
 
 DIRECT_LIGHT = Program(
     "direct_light", uniforms=(("lamp", LAMP), ("shadow", SHADOW), ("camera", CAMERA)),
-    samplers=("shadow_map", *(f"gbuffer_{name}" for name in ("position", "normal", "albedo", "geometry"))),
+    samplers=("shadow_map", "ggx_energy", *(f"gbuffer_{name}" for name in OUTPUTS)),
     images=(Image("direct", access="READ_WRITE"),), local_size=_GROUP)
 
 FILM = Program(

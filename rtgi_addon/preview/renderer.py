@@ -10,16 +10,17 @@ from .camera_view import CameraView
 from .device import dispatch
 from .film import Background, Film
 from .gbuffer import GBuffer, gbuffer_surfaces
+from .ggx import energy_table
 from .indirect import make_indirect
 from .indirect_pass import Indirect, draw_indirect
 from .lamp_sample import sample_lamp
 from .materials import Images
 from .pixel_filter import filter_offset
-from .programs import DIRECT_LIGHT
+from .programs import DIRECT_LIGHT, OUTPUTS
 from .settings import PASSES, PreviewSettings
 from .shadow_maps import ShadowMap, shadow_parts
 from .surfaces import SurfacePass
-from .textures import download, empty
+from .textures import download, empty, upload
 
 # Dimensions of a frame's random numbers: two of the pixel filter, three of a shadow map's place; then three for every lamp.
 _FRAME_DIMENSIONS, _LAMP_DIMENSIONS = 5, 3
@@ -39,6 +40,7 @@ class PreviewRenderer:
         self._surfaces = _surfaces(scene, self._images)
         self._bounds = scene_bounds(scene)
         self._background = Background(scene.world)
+        self._ggx_energy = upload(energy_table())
         self._indirect: Indirect = make_indirect(field, scene)
         self._gbuffer: GBuffer | None = None
         self._film: Film | None = None
@@ -128,14 +130,14 @@ class PreviewRenderer:
         pose = np.asarray(view.world_from_camera)
         camera = {"position_world": pose[:3, 3], "forward_world": -pose[:3, 2], "orthographic": int(view.orthographic),
                   "size": size}
-        gbuffer = {f"gbuffer_{name}": inputs[name] for name in ("position", "normal", "albedo", "geometry")}
+        gbuffer = {f"gbuffer_{name}": inputs[name] for name in OUTPUTS}
         for number, light in enumerate(self.scene.lights):
             sample = sample_lamp(light, _lamp_numbers(index, number))
             for part in shadow_parts(sample, view, self._bounds, resolution, self.settings.shadow_cascades, jitter):
                 if part.view is not None:
                     self._shadow_map.draw(self._surfaces, part.view, index)
                 dispatch(DIRECT_LIGHT, size, uniforms={"lamp": sample.uniforms, "shadow": part.uniforms, "camera": camera},
-                         samplers={"shadow_map": self._shadow_map.texture, **gbuffer}, images={"direct": self._direct})
+                         samplers={"shadow_map": self._shadow_map.texture, "ggx_energy": self._ggx_energy, **gbuffer}, images={"direct": self._direct})
 
 
 def scene_bounds(scene: Scene) -> np.ndarray:

@@ -56,8 +56,8 @@ class Material:
     """A surface's inputs.
 
     ``albedo`` is the hemispherical reflectance that a diffuse transport uses (already reduced by metallic and extended by
-    what a specular lobe reflects: the extraction's docstring says how); ``base_color``, ``metallic`` and ``roughness`` are
-    kept for the preview. ``emission`` is radiance [W·sr⁻¹·m⁻²], from both faces as in Cycles. ``alpha`` is coverage:
+    what a specular lobe reflects: the extraction's docstring says how); ``base_color``, ``metallic``, ``roughness`` and
+    ``specular`` (what the dielectric layer reflects at normal incidence) are kept for the preview. ``emission`` is radiance [W·sr⁻¹·m⁻²], from both faces as in Cycles. ``alpha`` is coverage:
     ``alpha_threshold`` None means a ray passes with probability 1 − alpha, a number means a hard cut at it.
     ``backface_culling`` is the user's statement that the surface is seen from its front only; light transport is two-sided
     all the same, as in Cycles. ``extraction`` says how it was read: 'nodes' or 'cycles-bake'.
@@ -73,6 +73,7 @@ class Material:
     roughness: Channel = field(default_factory=lambda: Channel.of(0.5))
     backface_culling: bool = False
     extraction: str = "nodes"
+    specular: Channel = field(default_factory=lambda: Channel.of(0.0))
 
     @property
     def is_emissive(self) -> bool:

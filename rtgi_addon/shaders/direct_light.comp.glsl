@@ -20,16 +20,21 @@ void main()
     return;
   }
   LampLight light = lamp_light(point);
-  vec3 geometric = texelFetch(gbuffer_geometry, texel, 0).xyz;
+  vec4 geometry = texelFetch(gbuffer_geometry, texel, 0);
   float cosine = dot(normal, light.direction);
-  if (cosine <= 0.0 || dot(geometric, light.direction) <= 0.0 || light.irradiance == vec3(0.0)) {
+  if (cosine <= 0.0 || dot(geometry.xyz, light.direction) <= 0.0 || light.irradiance == vec3(0.0)) {
     return;
   }
-  float visible = shadow.casts_shadow != 0 ? shadow_visibility(point, geometric) : 1.0;
+  float visible = shadow.casts_shadow != 0 ? shadow_visibility(point, geometry.xyz) : 1.0;
   if (visible <= 0.0) {
     return;
   }
-  vec3 reflected = reflectance(surface_at(texel), normal, normalize(towards_eye), light.direction);
+  vec4 base = texelFetch(gbuffer_base_color, texel, 0);
+  float roughness = texelFetch(gbuffer_emission, texel, 0).w;
+  towards_eye = normalize(towards_eye);
+  SurfaceLook look = surface_look(texelFetch(gbuffer_albedo, texel, 0).rgb, base.rgb, base.w, roughness, geometry.w,
+                                  clamp(dot(normal, towards_eye), 0.0, 1.0));
+  vec3 reflected = reflectance(look, normal, towards_eye, light.direction);
   vec4 sum = imageLoad(direct, texel);
   imageStore(direct, texel, sum + vec4(reflected * light.irradiance * (cosine * visible), 0.0));
 }

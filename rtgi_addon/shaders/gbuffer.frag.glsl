@@ -15,6 +15,7 @@ void main()
                         clamp(material_input(INPUT_METALLIC, metallic_image).r, 0.0, 1.0));
   out_emission = vec4(max(material_input(INPUT_EMISSION, emission_image), 0.0),
                       clamp(material_input(INPUT_ROUGHNESS, roughness_image).r, 0.0, 1.0));
-  out_geometry = vec4(facing_side() * face_normal_world / max(length(face_normal_world), 1e-30), 0.0);
+  out_geometry = vec4(facing_side() * face_normal_world / max(length(face_normal_world), 1e-30),
+                      clamp(dot(material_input(INPUT_SPECULAR, specular_image), vec3(1.0 / 3.0)), 0.0, 1.0));
   gl_FragDepth = linear_depth();
 }

@@ -174,7 +174,7 @@ def _without_unused_layers(meshes, materials) -> tuple[Mesh, ...]:
     """The meshes without the UV maps and attributes that no material looks at: at millions of triangles they weigh the most."""
     channels = [channel for material in materials
                 for channel in (material.albedo, material.emission, material.alpha, material.base_color, material.metallic,
-                                material.roughness)]
+                                material.roughness, material.specular)]
     attributes = {channel.attribute for channel in channels if channel.attribute}
     uv_layers = {channel.uv_layer for channel in channels if channel.texture is not None}
     return tuple(replace(mesh,

@@ -122,7 +122,7 @@ class MaterialReader:
         return Material(
             source.name, _channel(surface.albedo), _channel(surface.emission), _channel(alpha), threshold,
             _channel(base), _channel(surface.metallic), _channel(surface.roughness), source.use_backface_culling, extraction,
-        )
+            _channel(surface.specular))
 
     def _note(self, line: str) -> None:
         if line not in self.notes:
@@ -147,7 +147,7 @@ def _channel(value: Value) -> Channel:
 def _on_corners(material: Material, attributes: dict, corner_loops: np.ndarray, slot: int) -> Material:
     """The same material with channels read from corner attributes, which are added to ``attributes``."""
     changed = {}
-    for name in ("albedo", "emission", "alpha", "base_color", "metallic", "roughness"):
+    for name in ("albedo", "emission", "alpha", "base_color", "metallic", "roughness", "specular"):
         channel = getattr(material, name)
         if channel.texture is None:
             continue

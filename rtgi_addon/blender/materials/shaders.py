@@ -1,6 +1,6 @@
 """Follow shader links and boil every closure down to what diffuse transport knows: albedo, emission, coverage."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -23,6 +23,7 @@ class Surface:
     base_color: Value | None = None
     metallic: Value = _BLACK
     roughness: Value = field(default_factory=lambda: Value.of(1.0))
+    specular: Value = _BLACK
 
 
 class ShaderReader:
@@ -82,7 +83,8 @@ class ShaderReader:
         roughness = self._number(node, "Roughness", path, 0.5)
         level = 2.0 * self._number(node, "Specular IOR Level", path, 0.5)
         f0 = albedo.reflectance_from_ior(self._number(node, "IOR", path, 1.5)) * level
-        specular = albedo.dielectric_specular(roughness, f0 * np.clip(self._tint(node, path), 0.0, 1.0))
+        normal_reflectance = f0 * np.clip(self._tint(node, path), 0.0, 1.0)
+        specular = albedo.dielectric_specular(roughness, normal_reflectance)
         multiple = node.distribution == "MULTI_GGX"
         if self._number(node, "Sheen Weight", path) > 0.0:
             self._remark("its sheen is left out")
@@ -107,7 +109,7 @@ class ShaderReader:
         covered = 1.0 - passed
         return Surface(
             _ratio(reflected, covered), _ratio(emission, covered), covered * self._input(node, "Alpha", path, 1.0).clamped(),
-            base, metallic, self._preview(node, "Roughness", path, 0.5))
+            base, metallic, self._preview(node, "Roughness", path, 0.5), Value.of(normal_reflectance).clamped())
 
     def _tint(self, node, path: tuple) -> np.ndarray:
         try:
@@ -202,11 +204,11 @@ def _weighted(weight_a: Value, a: Surface, weight_b: Value, b: Surface, coverage
         alpha = Value.of(GLOW_COVERAGE)
     main = a if a.base_color is not None else b
     return Surface(_ratio(a.albedo * share_a + b.albedo * share_b, alpha), _ratio(emission, alpha), alpha,
-                   main.base_color, main.metallic, main.roughness)
+                   main.base_color, main.metallic, main.roughness, main.specular)
 
 
 def _covering(surface: Surface, alpha: Value) -> Surface:
-    return Surface(surface.albedo, surface.emission, alpha, surface.base_color, surface.metallic, surface.roughness)
+    return replace(surface, alpha=alpha)
 
 
 def _glows(surface: Surface) -> bool:

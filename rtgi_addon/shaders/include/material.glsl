@@ -7,6 +7,7 @@
 #define INPUT_BASE_COLOR 3
 #define INPUT_METALLIC 4
 #define INPUT_ROUGHNESS 5
+#define INPUT_SPECULAR 6
 
 // The host writes the two selections: interpolated UVs and attributes are as many as the triangles have.
 vec2 uv_of(int slot)
