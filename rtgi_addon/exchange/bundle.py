@@ -17,6 +17,7 @@ from ..errors import BakeError
 from ..scene import ProbeVolume, Scene
 from ..techniques import Field, ProbeGrid
 from ..techniques.lpv.field import LpvField
+from ..techniques.probes.field import ProbeField
 from . import flipbook
 from .exr import read_exr, write_exr
 from .files import disk_error, recover_swap, remove_folder, sibling, swap_folder, sync_file, sync_folder, write_atomically
@@ -38,6 +39,11 @@ class Bundle:
     path: Path
     manifest: dict
     grids: tuple[ProbeGrid, ...]
+
+    @property
+    def field(self) -> ProbeField:
+        """The probes as a field, whichever technique they were sampled from: what an engine that reads the bundle shows."""
+        return ProbeField(self.grids, includes_direct=bool(self.manifest.get("includes_direct")))
 
 
 def check_target(out) -> Path:

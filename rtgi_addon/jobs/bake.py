@@ -55,7 +55,7 @@ def bake_scene(scene: Scene, technique: str = "probes", overrides: dict | None =
 
     progress.stage("check")
     progress.step(0.0, "Checking the scene")
-    scene = replace(scene, volumes=_select(scene.volumes, volume, overrides))
+    scene = replace(scene, volumes=select_volumes(scene.volumes, volume, overrides))
     findings = check_scene(scene, sh_order=getattr(settings, "order", 2))
     require(findings)
     slow = slow_rays_warning()
@@ -104,7 +104,7 @@ def _gpu_kernels() -> Kernels:
     return GpuKernels()
 
 
-def _select(volumes: tuple[ProbeVolume, ...], wanted, overrides: dict) -> tuple[ProbeVolume, ...]:
+def select_volumes(volumes: tuple[ProbeVolume, ...], wanted, overrides: dict) -> tuple[ProbeVolume, ...]:
     """The volumes called ``wanted``, in the scene's order, with their own settings where no override replaces them."""
     if wanted is not None:
         wanted = [wanted] if isinstance(wanted, str) else list(wanted)

@@ -10,7 +10,6 @@ from ...jobs.fingerprint import content_hash
 from ...progress import Progress
 from ...scene import Scene
 from ...techniques import Field, get
-from ...techniques.probes.field import ProbeField
 from .. import dependencies
 from ..session import Baked, session
 
@@ -93,6 +92,4 @@ def _bundle(folder: Path) -> tuple[Shown, str]:
         bundle = read_bundle(folder)
     except BakeError as error:
         return Shown(None, f"The bake on disk cannot be shown, {error}"), ""
-    manifest = bundle.manifest
-    field = ProbeField(bundle.grids, includes_direct=bool(manifest.get("includes_direct")))
-    return Shown(field, ""), manifest["technique"]
+    return Shown(bundle.field, ""), bundle.manifest["technique"]
