@@ -21,17 +21,21 @@ def make_indirect(field: Field | None, scene: Scene, *, samples: int | None = No
     from ...techniques.lpv.field import LpvField
     from ...techniques.probes.field import ProbeField
     from ...techniques.rsm.field import RsmField
+    from ...techniques.vpl.field import VplField
     from ..indirect_pass import WorldLight
     from .lpv import lpv_tables
     from .probes import probe_tables
     from .relighting import RelitLight
     from .rsm import rsm_tables
+    from .vpl import vpl_tables
     if field is None:
         return WorldLight(scene)
     if isinstance(field, ProbeField):
         return RelitLight(field, probe_tables)
     if isinstance(field, LpvField):
         return RelitLight(field, lpv_tables)
+    if isinstance(field, VplField):
+        return RelitLight(field, partial(vpl_tables, samples=samples))
     # Shadow rays are not for a shader: the grids have seen them.
     if isinstance(field, RsmField) and not field.capture.settings.visibility:
         return RelitLight(field, partial(rsm_tables, samples=samples))

@@ -16,7 +16,7 @@ _SHEET_WIDTH = 16384 // 3
 
 
 class Sheet:
-    """Square maps of ``sizes`` [texels] on one sheet, in shelves: ``places`` are the lowest corners (x, y), ``size`` the sheet's."""
+    """Square maps of ``sizes`` [texels] on one sheet, in shelves: ``places`` are their lowest corners (x, y), ``size`` its own."""
 
     def __init__(self, sizes: list[int]):
         self.places: list[tuple[int, int]] = []
@@ -53,7 +53,7 @@ def rsm_values(count: int, pattern: Pattern) -> dict:
 
 
 def map_rows(views: list[ShadowView], sheet: Sheet, parts: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
-    """Texels of the list of maps: where each lies on the sheet, and which of the pattern's points it takes (``GatherMap.places``)."""
+    """Texels of the list of maps: where each lies on the sheet, and which points of the pattern are its (``GatherMap.places``)."""
     rows, first = np.zeros((max(len(views), 1), 5, 4), np.float32), 0
     for number, (view, place, (disk, flux)) in enumerate(zip(views, sheet.places, parts, strict=True)):
         rows[number, :3] = view.clip_from_world[[0, 1, 3]]

@@ -37,7 +37,7 @@ class VplField(Field):
     def __init__(self, context: LightContext, lights: LightSet, settings: VplSettings, seed: int, clamp: float | None,
                  natural: float | None, *,
                  kernels: Kernels | None = None):
-        self._context, self._set, self._settings, self._seed, self._clamp = context, lights, settings, seed, clamp
+        self.context, self._set, self._settings, self._seed, self.clamp = context, lights, settings, seed, clamp
         self._natural = natural
         self._kernels = kernels or NUMPY
         self.lights = lights.lights()
@@ -55,9 +55,9 @@ class VplField(Field):
     def irradiance(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """See Field. Every receiver casts a shadow ray to every virtual light that faces it."""
         points, normals = np.asarray(points, np.float32), np.asarray(normals, np.float32)
-        context = self._context
+        context = self.context
         if self._kernels is NUMPY:
-            result = gather(context, self.lights, points, normals, clamp=self._clamp, threads=context.threads)
+            result = gather(context, self.lights, points, normals, clamp=self.clamp, threads=context.threads)
         else:
             result = self._by_kernel(points, normals)
         if self._compensation is not None:
@@ -68,8 +68,8 @@ class VplField(Field):
 
     def radiance_sh(self, points: np.ndarray) -> np.ndarray:
         """SH coefficients (n, (order + 1)², 3) float32 of what arrives at free ``points`` (n, 3)."""
-        context, settings = self._context, self._settings
-        result = gather_sh(context, self.lights, points, settings.order, clamp=self._clamp, threads=context.threads)
+        context, settings = self.context, self._settings
+        result = gather_sh(context, self.lights, points, settings.order, clamp=self.clamp, threads=context.threads)
         if self._compensation is not None:
             result += self._compensation.coefficients(points, settings.order)
         if settings.direct:
@@ -83,7 +83,7 @@ class VplField(Field):
     def grids(self, progress: Progress | None = None) -> tuple[ProbeGrid, ...]:
         """The field on the scene's volumes, kept once made."""
         if self._grids is None:
-            context = self._context
+            context = self.context
             self._grids = resample(self, context, context.scene.volumes, self._settings.order, progress or Progress(),
                                    seed=self._seed, threads=context.threads, radiance_sh=self.radiance_sh)
         return self._grids
@@ -95,27 +95,27 @@ class VplField(Field):
         those of the bake.
         """
         (progress or Progress()).check()
-        context = self._context.relit(scene)
-        lights, change = follow(self._set, self._context, context, self._settings, self._seed)
-        field = VplField(context, lights, self._settings, self._seed, self._clamp, self._natural, kernels=self._kernels)
+        context = self.context.relit(scene)
+        lights, change = follow(self._set, self.context, context, self._settings, self._seed)
+        field = VplField(context, lights, self._settings, self._seed, self.clamp, self._natural, kernels=self._kernels)
         field.stats |= {"replaced_paths": change.replaced, "replaced_fraction": change.fraction}
         require_lights(field)
         return field
 
     def _by_kernel(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """As ``gather``, with the sum over VPLs left to the kernels and visibility found by rays."""
-        context, lights = self._context, self.lights
+        context, lights = self.context, self.lights
         result = gather(context, lights.take(slice(0, 0)), points, normals, threads=context.threads)
         origins = offset_origins(points, normals, normals)
         for span in chunks(len(points), max(1, MAX_VISIBILITIES // max(lights.count, 1))):
             seen = visibility(context, lights, points[span], normals[span])
-            result[span] += self._kernels.vpl_gather(lights, origins[span], normals[span], seen, self._clamp)
+            result[span] += self._kernels.vpl_gather(lights, origins[span], normals[span], seen, self.clamp)
         return result
 
     def _lamp_samples(self):
         """(sources, lamp, number of samples, (2,) numbers) of every sample of every lamp."""
-        sources = Sources(self._context)
-        for lamp in range(self._context.lamps.count):
+        sources = Sources(self.context)
+        for lamp in range(self.context.lamps.count):
             count = 1 if sources.is_delta[lamp] else LAMP_SAMPLES
             for numbers in sobol_owen(count, 2, hash_u32(self._seed, lamp, 6)):
                 yield sources, lamp, np.float32(count), numbers

@@ -1,0 +1,96 @@
+"""What every virtual light sees, small enough to keep: the plane of the nearest surface in each direction of a few hundred.
+
+An imperfect shadow map (T. Ritschel et al., "Imperfect Shadow Maps for Efficient Computation of Indirect Illumination", SIGGRAPH
+Asia 2008) in that each is coarse and their sum is not. Apart from the paper: maps are traced, and hold planes instead of depths. A
+receiver is seen unless it lies behind the plane, so surfaces do not shadow themselves however slanted, and a wall holds from
+its very back; what a texel misses is the edge of an object within it.
+"""
+
+import numpy as np
+
+from ...numerics import grid as lattice
+from ...numerics.sampling import frame
+from ...transport.context import LightContext
+from ...transport.parallel import CHUNK, chunks, parallel_for
+from ...transport.vectors import dot
+
+# Texels along a side of a virtual light's hemisphere, and of a distant light's view.
+SIDE, DISTANT_SIDE = 16, 48
+# How far behind a plane a receiver is still seen: in shares of its distance, so that a sphere does not shadow itself between the
+# texels, and in widths of a distant light's texel.
+TOLERANCE, DISTANT_TOLERANCE = 0.02, 0.25
+# A distant light's view covers this many times the box around all volumes, cut to the scene.
+FOCUS = 2.0
+_FREE = np.float32([0.0, 0.0, 0.0, -1e30])
+
+
+def hemisphere(side: int) -> np.ndarray:
+    """Unit directions (side², 3) float32 about +Z at the texels' centres: half an octahedron turned by 45° fills the square."""
+    centres = (2.0 * np.arange(side) + 1.0) / side - 1.0
+    v, u = np.meshgrid(centres, centres, indexing="ij")
+    x, y = 0.5 * (u + v).ravel(), 0.5 * (u - v).ravel()
+    directions = np.stack([x, y, 1.0 - np.abs(x) - np.abs(y)], axis=1)
+    return (directions / np.linalg.norm(directions, axis=1, keepdims=True)).astype(np.float32)
+
+
+def light_planes(context: LightContext, positions: np.ndarray, normals: np.ndarray, side: int = SIDE) -> np.ndarray:
+    """(n, side², 4) float32: the planes (normal towards the light, distance from the world's origin) that lights at ``positions``
+    (n, 3) see about ``normals`` (n, 3); where they see nothing, one that all points are in front of."""
+    local, (tangent, bitangent) = hemisphere(side), frame(np.asarray(normals, np.float32))
+    axes = np.stack([tangent, bitangent, normals], axis=1)
+
+    def rays(span):
+        directions = np.einsum("kc,ncd->nkd", local, axes[span]).reshape(-1, 3)
+        return np.repeat(np.asarray(positions, np.float32)[span], len(local), axis=0), directions
+
+    return _planes(context, rays, len(positions), len(local))
+
+
+def focus(context: LightContext) -> tuple[np.ndarray, float]:
+    """Centre (3,) float64 and radius [m] of what distant lights' views cover."""
+    cube = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    corners = np.concatenate([lattice.transform_points(volume.world_from_local, cube) for volume in context.scene.volumes])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    grown = 0.5 * (low + high) + 0.5 * FOCUS * np.array([low - high, high - low])
+    bounds = np.array(context.geometry.bounds(), np.float64)
+    box = np.array([np.maximum(grown[0], bounds[0]), np.minimum(grown[1], bounds[1])])
+    if np.any(box[0] > box[1]):
+        box = bounds
+    return box.mean(axis=0), max(0.5 * float(np.linalg.norm(box[1] - box[0])), 1e-6)
+
+
+def distant_planes(context: LightContext, directions: np.ndarray, side: int = DISTANT_SIDE) -> np.ndarray:
+    """(m, side², 4) float32: the planes that parallel rays from ``directions`` (m, 3) meet first, in the square about ``focus``."""
+    centre, radius = focus(context)
+    centres = (2.0 * np.arange(side) + 1.0) / side - 1.0
+    v, u = (part.ravel()[:, None] * radius for part in np.meshgrid(centres, centres, indexing="ij"))
+    bounds = np.array(context.geometry.bounds(), np.float64)
+    away = 1.001 * (float(np.linalg.norm(np.abs(bounds - centre).max(axis=0))) + radius)
+    directions = np.asarray(directions, np.float64)
+    tangent, bitangent = frame(directions)
+
+    def rays(span):
+        origins = (centre + u * tangent[span, None] + v * bitangent[span, None] + away * directions[span, None])
+        return origins.reshape(-1, 3).astype(np.float32), np.repeat(-directions[span], side * side, axis=0).astype(np.float32)
+
+    return _planes(context, rays, len(directions), side * side)
+
+
+def _planes(context: LightContext, rays, count: int, per_light: int) -> np.ndarray:
+    result = np.empty((count, per_light, 4), np.float32)
+    spans = chunks(count, max(1, CHUNK // per_light))
+
+    def work(i):
+        origins, directions = rays(spans[i])
+        hits = context.tracer.intersect(np.ascontiguousarray(origins), np.ascontiguousarray(directions))
+        planes = np.tile(_FREE, (len(origins), 1))
+        rows = np.flatnonzero(hits.primitive >= 0)
+        primitive = hits.primitive[rows]
+        normals = context.geometry.normals_world[primitive]
+        normals = normals * -np.copysign(np.float32(1.0), dot(normals, directions[rows]))[:, None]
+        planes[rows, :3] = normals
+        planes[rows, 3] = dot(normals, context.geometry.points(primitive, hits.u[rows], hits.v[rows]))
+        result[spans[i]] = planes.reshape(-1, per_light, 4)
+
+    parallel_for(work, len(spans), context.threads)
+    return result

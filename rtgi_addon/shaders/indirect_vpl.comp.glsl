@@ -1,0 +1,2 @@
+#include "include/irradiance_vpl.glsl"
+#include "include/indirect_frame.glsl"
