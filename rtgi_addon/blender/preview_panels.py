@@ -4,8 +4,8 @@ import bpy
 
 from .engine import ENGINE_ID
 from .engine.shown import shown_for
+from .engine.viewport import STALE, is_stale
 from .panels import draw_lines
-from .session import session
 
 
 class _OfOurEngine:
@@ -39,11 +39,11 @@ class RTGI_PT_preview(_OfOurEngine, bpy.types.Panel):
         column.prop(preview, "render_samples")
         layout.prop(preview, "mode")
         layout.prop(preview, "resolution_scale")
-        note = shown_for(scene).note
-        if note:
-            draw_lines(layout, note, context.region.width, "INFO")
-        elif session.stale.get(scene.name):
-            draw_lines(layout, "The bake is out of date", context.region.width, "ERROR")
+        shown = shown_for(scene)
+        if shown.note:
+            draw_lines(layout, shown.note, context.region.width, "INFO")
+        elif is_stale(scene, shown):
+            draw_lines(layout, STALE, context.region.width, "ERROR")
 
 
 class RTGI_PT_preview_shadows(_OfOurEngine, bpy.types.Panel):
@@ -104,7 +104,8 @@ def draw_header(self, context):
     row = self.layout.row(align=True)
     row.prop(scene.rtgi, "technique", text="")
     row.prop(scene.rtgi_preview, "mode", text="")
-    if session.stale.get(scene.name) or shown_for(scene).field is None:
+    shown = shown_for(scene)
+    if shown.field is None or is_stale(scene, shown):
         row.operator("rtgi.bake", text="", icon="ERROR")
 
 

@@ -7,40 +7,10 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="needs Blender or its Python module")
 
 from fake_technique import FakeTechnique  # noqa: E402
+from panel_layout import Layout  # noqa: E402
 
 import rtgi_addon  # noqa: E402
 from rtgi_addon.techniques import registry  # noqa: E402
-
-ICONS = set(bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items.keys())
-
-
-class Layout:
-    """Takes what a panel draws as ``UILayout`` would: ``texts`` and ``shown`` properties and operators, over all sub-layouts."""
-
-    def __init__(self, parent=None):
-        self.texts, self.shown = (parent.texts, parent.shown) if parent else ([], [])
-
-    def _sub(self, **_):
-        return Layout(self)
-
-    row = column = split = box = _sub
-
-    def label(self, text="", icon="NONE"):
-        assert icon in ICONS
-        self.texts.append(text)
-
-    def prop(self, data, name, text=None, icon="NONE", expand=False):
-        assert name in data.bl_rna.properties and icon in ICONS
-        self.shown.append(name)
-
-    def operator(self, name, text=None, icon="NONE"):
-        module, _, function = name.partition(".")
-        assert getattr(getattr(bpy.ops, module), function).get_rna_type() and icon in ICONS
-        self.shown.append(name)
-
-    def progress(self, text="", factor=0.0, type="RING"):
-        assert 0 <= factor <= 1 and type in {"BAR", "RING"}
-        self.texts.append(text)
 
 
 @pytest.fixture

@@ -29,8 +29,12 @@ def rtgi_handlers():
 
 def traces():
     """What the add-on leaves in Blender."""
-    owners = {owner.__name__ for owner in (bpy.types.Scene, bpy.types.LightProbe, bpy.types.Object) if hasattr(owner, "rtgi")}
-    return rtgi_classes() | rtgi_handlers() | owners | set(dir(bpy.ops.rtgi))
+    owners = {owner.__name__ for owner in (bpy.types.Scene, bpy.types.LightProbe, bpy.types.Object, bpy.types.ViewLayer)
+              if hasattr(owner, "rtgi") or hasattr(owner, "rtgi_preview")}
+    panels = {name for name in dir(bpy.types) if "RTGI" in (getattr(getattr(bpy.types, name), "COMPAT_ENGINES", None) or ())}
+    header = {getattr(draw, "__name__", "") for draw in getattr(bpy.types.VIEW3D_HT_header.draw, "_draw_funcs", ())
+              if draw.__module__.startswith("rtgi_addon")}
+    return rtgi_classes() | rtgi_handlers() | owners | panels | header | set(dir(bpy.ops.rtgi))
 
 
 def test_nothing_is_left_after_disabling_twice():
@@ -42,7 +46,8 @@ def test_nothing_is_left_after_disabling_twice():
         rtgi_addon.unregister()
         assert traces() == before
     assert registered[0] == registered[1]
-    assert {"Scene", "LightProbe", "RTGI_OT_bake", "RTGI_PT_bake"} <= registered[0] - before
+    assert {"Scene", "LightProbe", "ViewLayer", "RTGI_OT_bake", "RTGI_PT_bake"} <= registered[0] - before
+    assert {"RTGI_RenderEngine", "DATA_PT_EEVEE_light", "RENDER_PT_output", "draw_header"} <= registered[0] - before
     assert {("load_pre", "cancel_before_load"), ("depsgraph_update_post", "compare_after_change")} <= registered[0]
 
 

@@ -103,11 +103,14 @@ def _serve_in(seconds: float) -> None:
     bpy.app.timers.register(_serve, first_interval=seconds)
 
 
-def _serve() -> None:
-    """Read what waits, in the context of a window that shows it."""
+def _serve() -> float | None:
+    """Read what waits, in the context of a window that shows it. While Blender renders, readings that take operators would fail."""
+    if bpy.app.is_job_running("RENDER"):
+        return _LONGEST
     for window in bpy.context.window_manager.windows:
         live = _live.get((window.scene.name, window.view_layer.name))
         if live is not None and live.pending:
             with bpy.context.temp_override(window=window):
                 live.read(bpy.context.evaluated_depsgraph_get())
     redraw()
+    return None

@@ -1,6 +1,6 @@
 """Which bake a preview shows: this session's for the chosen technique, or the bundle on disk, or none."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
@@ -29,7 +29,7 @@ def shown_for(scene: bpy.types.Scene) -> Shown:
     technique = get(scene.rtgi.technique)
     baked = session.baked.get((scene.name, technique.name))
     if baked is not None:
-        return Shown(baked.field, "", baked)
+        return Shown(baked.shown, "", baked)
     return _from_disk(scene, technique)
 
 
@@ -41,7 +41,7 @@ def lit_for(shown: Shown, scene: Scene, progress: Progress) -> Field | None:
     baked = shown.baked
     if baked is None or not hasattr(baked.field, "relight") or same_light(baked.scene, scene):
         return shown.field
-    return baked.field.relight(replace(baked.scene, lights=scene.lights, world=scene.world), progress)
+    return baked.relight(scene, progress)
 
 
 def same_light(one: Scene, other: Scene) -> bool:

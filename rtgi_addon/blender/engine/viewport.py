@@ -13,6 +13,12 @@ from .shown import Shown, shown_for
 STALE = "The bake is out of date"
 
 
+def is_stale(scene, shown: Shown) -> bool:
+    """True if what is shown was baked from ``scene`` when it was another."""
+    of_this = scene.rtgi.last_bake.technique == scene.rtgi.technique
+    return shown.field is not None and of_this and session.stale.get(scene.name, False)
+
+
 class Viewport:
     """The state of one viewport, which lives as long as Blender's engine object for it."""
 
@@ -77,6 +83,8 @@ class Viewport:
 
     def _status(self, scene, live: LiveScene, shown: Shown) -> str:
         parts = [f"Sample {self._renderer.samples} of {self._settings.samples}"]
-        if session.stale.get(scene.name) and shown.field is not None:
+        if self._renderer.busy:
+            parts.append("Relighting")
+        if is_stale(scene, shown):
             parts.append(STALE)
         return " | ".join([*parts, *(text for text in (shown.note, live.error) if text)])
