@@ -80,7 +80,8 @@ def propagation(bare: BareContext, cells: int, steps: int, repeats: int) -> str:
     first = [bare.upload(atlas.pack(np.moveaxis(light[:, channel], 0, -1) * FLUX_SCALE)) for channel in range(3)]
     spare = [[bare.empty(*atlas.size) for _ in CHANNELS] for _ in range(2)]
     total = [bare.empty(*atlas.size) for _ in CHANNELS]
-    values = {"resolution": grid.resolution, "columns": atlas.columns, "size": atlas.size, "side_ahead": SIDE_AHEAD, "bounces": 1}
+    values = {"resolution": grid.resolution, "columns": atlas.columns, "size": atlas.size, "side_ahead": SIDE_AHEAD, "bounces": 1,
+              "accumulate": 1}
 
     def work():
         current = first

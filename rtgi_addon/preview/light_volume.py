@@ -11,7 +11,7 @@ from ..progress import Progress
 from ..techniques.lpv.geometry_volume import Blocking
 from ..techniques.lpv.grid import PER_FLUX, PER_VECTOR, SIDE_AHEAD, LpvGrid
 from .atlas import Atlas
-from .device import RenderTarget, bind, dispatch, vertex_buffer
+from .device import RenderTarget, bind, dispatch, uniform_buffer, vertex_buffer
 from .packing import BLOCK_COLUMNS, FLUX_SCALE, face_blocks
 from .programs import LPV_INJECT, LPV_PROPAGATE
 from .textures import download, empty, upload
@@ -36,7 +36,7 @@ def inject_lights(grid: LpvGrid, positions: np.ndarray, normals: np.ndarray, flu
             vertices = {"cell_position": grid.cells_of(positions), "normal": normals, "flux": flux}
             buffer = vertex_buffer({name: np.asarray(values, np.float32) for name, values in vertices.items()})
             values = {"resolution": grid.resolution, "columns": atlas.columns, "size": atlas.size, "per_flux": PER_FLUX,
-                      "per_vector": PER_VECTOR}
+                      "per_vector": PER_VECTOR, "corner": grid.corner, "cell": grid.cell, "level": 0}
             gpu.state.program_point_size_set(True)
             shader, _alive = bind(LPV_INJECT, uniforms={"parameters": values})
             gpu.types.GPUBatch(type="POINTS", buf=buffer).draw(shader)
@@ -54,20 +54,22 @@ class FaceTextures:
 
 
 def propagate_light(light: LightTextures, faces: FaceTextures, steps: int, progress: Progress | None = None) -> LightTextures:
-    """Accumulated fluxes as new textures: ``light`` (fluxes) and what each of ``steps`` steps makes of it, summed; ``light`` is
-    overwritten. Raises Cancelled when asked to stop."""
+    """Accumulated fluxes as new textures: ``light`` (fluxes) and what each of ``steps`` (at least 1) makes of it, summed; ``light``
+    is overwritten. Raises Cancelled when asked to stop."""
     atlas = faces.atlas
-    current, following = light, tuple(empty(*atlas.size) for _ in _CHANNELS)
-    total = tuple(upload(download(texture)) for texture in light)
+    current, following, total = light, *(tuple(empty(*atlas.size) for _ in _CHANNELS) for _ in range(2))
     values = {"resolution": atlas.resolution, "columns": atlas.columns, "size": atlas.size, "side_ahead": SIDE_AHEAD,
               "bounces": int(faces.bounces)}
+    # The first step begins the sum with the light itself.
+    struct = LPV_PROPAGATE.uniforms[0][1]
+    first, further = (uniform_buffer(struct, {**values, "accumulate": accumulate}) for accumulate in (0, 1))
     for step in range(steps):
         if progress is not None:
             progress.step(step / steps, "propagating light")
         samplers = {f"light_{name}": texture for name, texture in zip(_CHANNELS, current, strict=True)}
         images = {f"{kind}_{name}": texture for kind, textures in (("next", following), ("total", total))
                   for name, texture in zip(_CHANNELS, textures, strict=True)}
-        dispatch(LPV_PROPAGATE, atlas.size, uniforms={"parameters": values},
+        dispatch(LPV_PROPAGATE, atlas.size, uniforms={"parameters": further if step else first},
                  samplers={**samplers, "faces": faces.faces, "blockers": faces.blockers}, images=images)
         current, following = following, current
     return total

@@ -62,15 +62,47 @@ def surface_program(name: str, uv_count: int, color_count: int, smooth: bool) ->
 _RGB = ("red", "green", "blue")
 _GROUP = (8, 8)
 
-LPV_INJECT = Program(
-    "lpv_inject", uniforms=(("parameters", UniformStruct("InjectParameters", (
-        ("ivec3", "resolution"), ("int", "columns"), ("vec2", "size"), ("float", "per_flux"), ("float", "per_vector")))),),
-    inputs=(("VEC3", "cell_position"), ("VEC3", "normal"), ("VEC3", "flux")),
-    flat_varyings=(("VEC4", "lobe"), ("VEC3", "light_flux")), outputs=tuple(("VEC4", f"out_{name}") for name in _RGB))
+# A light's cosine lobe goes into one texel a channel; the vertex stages differ in where lights come from.
+_INJECT = UniformStruct("InjectParameters", (
+    ("ivec3", "resolution"), ("int", "columns"), ("vec2", "size"), ("float", "per_flux"), ("float", "per_vector"),
+    ("vec3", "corner"), ("float", "cell"), ("int", "level")))
+_LOBES = {"flat_varyings": (("VEC4", "lobe"), ("VEC3", "light_flux")), "outputs": tuple(("VEC4", f"out_{name}") for name in _RGB)}
+
+LPV_INJECT = Program("lpv_inject", uniforms=(("parameters", _INJECT),),
+                     inputs=(("VEC3", "cell_position"), ("VEC3", "normal"), ("VEC3", "flux")), **_LOBES)
+
+LPV_INJECT_MAP = Program("lpv_inject", vertex="lpv_inject_map", uniforms=(("parameters", _INJECT),),
+                         samplers=("map_position", "map_normal", "map_flux"), inputs=(("INT", "texel"),), **_LOBES)
+
+
+@cache
+def lpv_inject_border(cascades: int) -> Program:
+    """Into a cascade, what coarser ones of so many in all send through its border."""
+    return Program("lpv_inject", vertex="lpv_inject_border",
+                   uniforms=(("parameters", _INJECT), ("indirect", lpv_cascades(cascades))),
+                   samplers=tuple(f"light_{name}" for name in _RGB), defines=(("LPV_CASCADES", str(cascades)),),
+                   inputs=(("VEC3", "face_position"), ("VEC3", "inward"), ("VEC3", "cell_position"), ("VEC3", "normal"),
+                           ("FLOAT", "share")), **_LOBES)
+
+
+@cache
+def lpv_cascades(cascades: int) -> UniformStruct:
+    """The uniforms of include/irradiance_lpv.glsl for so many cascades."""
+    return UniformStruct("LpvCascades", (
+        ("vec4", "corner", cascades), ("ivec4", "resolution", cascades), ("vec4", "factors", cascades),
+        ("float", "surface_cells"), ("float", "behind"), ("float", "blend_cells"), ("int", "dampening")))
+
+
+LPV_STORE = Program(
+    "lpv_store", uniforms=(("parameters", UniformStruct("LpvStoreParameters", (
+        ("vec4", "scale"), ("ivec2", "size"), ("ivec2", "first_texel")))),),
+    samplers=(*(f"light_{name}" for name in _RGB), *(f"added_{name}" for name in _RGB)), local_size=_GROUP,
+    images=tuple(Image(f"stored_{name}") for name in _RGB))
 
 LPV_PROPAGATE = Program(
     "lpv_propagate", uniforms=(("parameters", UniformStruct("PropagateParameters", (
-        ("ivec3", "resolution"), ("int", "columns"), ("ivec2", "size"), ("float", "side_ahead"), ("int", "bounces")))),),
+        ("ivec3", "resolution"), ("int", "columns"), ("ivec2", "size"), ("float", "side_ahead"), ("int", "bounces"),
+        ("int", "accumulate")))),),
     samplers=(*(f"light_{name}" for name in _RGB), "faces", "blockers"), local_size=_GROUP,
     images=(*(Image(f"next_{name}") for name in _RGB), *(Image(f"total_{name}", access="READ_WRITE") for name in _RGB)))
 

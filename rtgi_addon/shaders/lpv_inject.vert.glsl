@@ -1,14 +1,7 @@
-// A virtual light becomes a cosine lobe of intensity in the cell in front of its surface (techniques/lpv/injection.py): one point,
-// blended additively into the texel of that cell.
-#include "include/volume.glsl"
+// Virtual lights from lists.
+#include "include/lpv_inject.glsl"
 
 void main()
 {
-  ivec3 resolution = parameters.resolution;
-  ivec3 cell = ivec3(floor(cell_position + 0.5 * normal));
-  lobe = vec4(parameters.per_flux, parameters.per_vector * normal.yzx);
-  light_flux = flux;
-  vec2 texel = vec2(atlas_texel(cell, resolution, parameters.columns)) + 0.5;
-  gl_Position = is_inside(cell, resolution) ? vec4(texel / parameters.size * 2.0 - 1.0, 0.0, 1.0) : vec4(2.0, 2.0, 2.0, 1.0);
-  gl_PointSize = 1.0;
+  inject_light(cell_position, normal, flux);
 }

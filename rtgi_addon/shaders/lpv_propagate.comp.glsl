@@ -82,7 +82,13 @@ void main()
   imageStore(next_red, texel, result.channel[0]);
   imageStore(next_green, texel, result.channel[1]);
   imageStore(next_blue, texel, result.channel[2]);
-  imageStore(total_red, texel, imageLoad(total_red, texel) + result.channel[0]);
-  imageStore(total_green, texel, imageLoad(total_green, texel) + result.channel[1]);
-  imageStore(total_blue, texel, imageLoad(total_blue, texel) + result.channel[2]);
+  // The sum begins with the light itself.
+  if (parameters.accumulate != 0) {
+    own.channel[0] = imageLoad(total_red, texel);
+    own.channel[1] = imageLoad(total_green, texel);
+    own.channel[2] = imageLoad(total_blue, texel);
+  }
+  imageStore(total_red, texel, own.channel[0] + result.channel[0]);
+  imageStore(total_green, texel, own.channel[1] + result.channel[1]);
+  imageStore(total_blue, texel, own.channel[2] + result.channel[2]);
 }

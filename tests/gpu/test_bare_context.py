@@ -70,7 +70,7 @@ def test_one_step_of_light_is_numpys(bare):
     bare.dispatch(
         programs.LPV_PROPAGATE, atlas.size,
         uniforms={"parameters": {"resolution": grid.resolution, "columns": atlas.columns, "size": atlas.size,
-                                 "side_ahead": SIDE_AHEAD, "bounces": 1}},
+                                 "side_ahead": SIDE_AHEAD, "bounces": 1, "accumulate": 1}},
         samplers={**{f"light_{name}": light[i] for i, name in enumerate(CHANNELS)}, "faces": faces, "blockers": blockers},
         images={f"{kind}_{name}": textures[i] for kind, textures in (("next", following), ("total", total))
                 for i, name in enumerate(CHANNELS)})

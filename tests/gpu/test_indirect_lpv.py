@@ -1,11 +1,17 @@
 """The irradiance function of light propagation volumes on the GPU against ``LpvField.irradiance``, relative to the largest
 irradiance, and volumes that follow a lamp there."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+import room_scenes as rooms
 import scene_builders as build
-from receivers import directions, points_in, relative_error
+from receivers import directions, points_in, relative_error, waited
 
+from rtgi_addon.progress import Progress
+from rtgi_addon.scene import World
+from rtgi_addon.techniques.lpv import TECHNIQUE, LpvSettings
 from rtgi_addon.techniques.lpv.field import LpvField
 from rtgi_addon.techniques.lpv.grid import LpvGrid
 
@@ -40,3 +46,65 @@ def test_every_shape(indirect, resolution):
     field = random_field(2, resolution)
     points = points_in(4.0, 1000) + np.float32(1.0)
     assert relative_error(indirect.make_indirect(field, build.closed_box()), field, points, directions(1000)).max() < TOLERANCE
+
+
+ROOMS = rooms.two_rooms(resolution=(2, 2, 2), half_size=(2.0, 0.95, 0.95))
+
+
+def bake(scene, **settings):
+    return TECHNIQUE.bake(scene, LpvSettings(**({"order": 1, "steps": 32, "map_resolution": 64} | settings)),
+                          np.random.default_rng(0), Progress())
+
+
+def moved(scene, offset=0.3, world=None):
+    lights = tuple(replace(light, position_world=light.position_world + np.float32([offset, 0, 0])) for light in scene.lights)
+    return replace(scene, lights=lights, world=scene.world if world is None else World.constant(world))
+
+
+# Rays and rasters differ where a texel's centre lies on an edge, and its light falls into the next cell.
+@pytest.mark.parametrize(("settings", "world"), [({}, 0.0), ({"cascades": 2, "cell_size": 0.15}, 0.3),
+                                                 ({"cascades": 3, "cell_size": 0.08, "resolution": 12}, 0.0),
+                                                 ({"further_bounces": False}, 0.3), ({"blocking": False}, 0.0)])
+def test_a_moved_lamp_is_followed_on_the_gpu(indirect, settings, world):
+    scene = replace(ROOMS, world=World.constant(world))
+    field = bake(scene, **settings)
+    made = indirect.make_indirect(field, scene)
+    points, normals = points_in((1.9, 0.9, 0.9), 1500), directions(1500)
+    for offset in (0.3, -0.2):
+        assert made.follow(moved(scene, offset)) and not made.busy
+        found = relative_error(made, field.relight(moved(scene, offset)), points, normals)
+        assert found.max() < 0.005 and np.sqrt(np.mean(found**2)) < 5e-4
+    assert relative_error(made, field, points, normals).max() > 0.02
+
+
+def test_emissive_surfaces_stay_and_lamps_go_out(indirect):
+    scene = build.cube_furnace(albedo=0.4, emission=0.2)
+    scene = replace(scene, lights=(build.point_light((0.2, 0.1, 0.0), 2.0),))
+    field = bake(scene)
+    made = indirect.make_indirect(field, scene)
+    dark = replace(scene, lights=())
+    assert made.follow(dark)
+    assert relative_error(made, field.relight(dark), points_in(0.9, 500), directions(500)).max() < 1e-4
+
+
+def test_a_changed_world_is_traced_beside_the_picture(indirect):
+    field = bake(replace(ROOMS, world=World.constant(0.3)))
+    made = indirect.make_indirect(field, ROOMS)
+    points, normals = points_in((1.9, 0.9, 0.9), 500), directions(500)
+    other = moved(ROOMS, 0.2, 1.0)
+    assert made.follow(other) and waited(made)
+    assert relative_error(made, field.relight(other), points, normals).max() < TOLERANCE
+    # The next lamp is followed on the GPU again.
+    again = moved(other, -0.3)
+    assert made.follow(again) and not made.busy
+    assert relative_error(made, field.relight(again), points, normals).max() < 0.005
+    made.close()
+
+
+def test_what_cannot_be_followed_is_said(indirect):
+    field = bake(ROOMS)
+    made = indirect.make_indirect(field, ROOMS)
+    assert not made.follow(rooms.two_rooms(thickness=0.2)) and "bake again" in made.error
+    read = LpvField.from_arrays(field.arrays(), params=field.params)
+    made = indirect.make_indirect(read, ROOMS)
+    assert not made.follow(moved(ROOMS)) and "bake again" in made.error

@@ -23,7 +23,7 @@ def make_indirect(field: Field | None, scene: Scene, *, samples: int | None = No
     from ...techniques.rsm.field import RsmField
     from ...techniques.vpl.field import VplField
     from ..indirect_pass import WorldLight
-    from .lpv import lpv_tables
+    from .live_lpv import LpvLight
     from .probes import probe_tables
     from .relighting import RelitLight
     from .rsm import rsm_tables
@@ -33,7 +33,7 @@ def make_indirect(field: Field | None, scene: Scene, *, samples: int | None = No
     if isinstance(field, ProbeField):
         return RelitLight(field, probe_tables)
     if isinstance(field, LpvField):
-        return RelitLight(field, lpv_tables)
+        return LpvLight(field)
     if isinstance(field, VplField):
         return RelitLight(field, partial(vpl_tables, samples=samples))
     # Shadow rays are not for a shader: the grids have seen them.

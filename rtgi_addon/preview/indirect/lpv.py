@@ -7,7 +7,7 @@ from ...techniques.lpv.field import LpvField
 from ...techniques.lpv.gather import BEHIND_CELLS, FACE_AHEAD, FACE_TOTAL, SURFACE_CELLS
 from ...techniques.lpv.grid import LpvGrid
 from ..atlas import Atlas
-from ..uniforms import UniformStruct
+from ..programs import lpv_cascades
 from .tables import Tables
 
 CHANNELS = ("red", "green", "blue")
@@ -22,15 +22,8 @@ class Stack:
         self.size = max(atlas.size[0] for atlas in self.atlases), sum(atlas.size[1] for atlas in self.atlases)
 
 
-def lpv_struct(cascades: int) -> UniformStruct:
-    """The functions' uniforms for so many cascades."""
-    return UniformStruct("LpvCascades", (
-        ("vec4", "corner", cascades), ("ivec4", "resolution", cascades), ("vec4", "factors", cascades),
-        ("float", "surface_cells"), ("float", "behind"), ("float", "blend_cells"), ("int", "dampening")))
-
-
 def lpv_values(grids: tuple[LpvGrid, ...], stack: Stack, dampening: bool) -> dict:
-    """Values of ``lpv_struct``."""
+    """Values of ``programs.lpv_cascades``."""
     # Factors of coefficients 0 and 1 to 3: SH constants, the faces' solid angles, over the area of a face.
     total, along = np.sqrt(0.25 / np.pi) * FACE_TOTAL, np.sqrt(0.75 / np.pi) * FACE_AHEAD
     return {
@@ -48,6 +41,6 @@ def lpv_tables(field: LpvField) -> Tables:
     for volume, atlas, row in zip(field.volumes, stack.atlases, stack.rows, strict=True):
         for channel in range(3):
             light[channel, row:row + atlas.size[1], :atlas.size[0]] = atlas.pack(np.moveaxis(volume[:, channel], 0, -1))
-    return Tables("indirect_lpv", lpv_struct(len(grids)), lpv_values(grids, stack, field.params.get("dampening", True)),
+    return Tables("indirect_lpv", lpv_cascades(len(grids)), lpv_values(grids, stack, field.params.get("dampening", True)),
                   {f"light_{name}": light[channel] for channel, name in enumerate(CHANNELS)},
                   (("LPV_CASCADES", str(len(grids))),))

@@ -12,18 +12,20 @@ from .tables import Tables
 
 
 class RelitLight(FieldLight):
-    """The irradiance function of ``field``, followed through ``field.relight`` on a worker.
+    """The irradiance function of ``field``, followed through ``relight`` on a worker (None: the field's own).
 
     ``tables_of`` makes the tables of a field; it runs on the worker too. Scenes that arrive while one is worked on wait for it, all
     but the newest forgotten, so that light keeps pace with a lamp that is dragged.
     """
 
-    def __init__(self, field: Field, tables_of: Callable[[Field], Tables]):
+    def __init__(self, field: Field, tables_of: Callable[[Field], Tables],
+                 relight: Callable[[Scene, Progress], Field] | None = None):
         super().__init__(tables_of(field), field.includes_direct)
-        self._field, self._tables_of = field, tables_of
+        self._tables_of, self._relight = tables_of, relight or getattr(field, "relight", None)
+        self._name = field.technique
         self._lock = threading.Lock()
         self._waiting: Scene | None = None
-        self._result: Tables | Exception | None = None
+        self._result: tuple[Field, Tables] | Exception | None = None
         self._worker: threading.Thread | None = None
         self._progress = Progress()
 
@@ -35,8 +37,8 @@ class RelitLight(FieldLight):
 
     def follow(self, scene: Scene) -> bool:
         """See FieldLight."""
-        if not hasattr(self._field, "relight"):
-            self.error = f"{self._field.technique} cannot follow a change of light: bake again"
+        if self._relight is None:
+            self.error = f"{self._name} cannot follow a change of light: bake again"
             return False
         with self._lock:
             self._waiting = scene
@@ -55,14 +57,23 @@ class RelitLight(FieldLight):
             self.error = str(result)
             return False
         self.error = None
-        self.set(result)
+        self.take(*result)
         return True
 
-    def close(self) -> None:
-        """See Indirect; waits until the worker has felt it."""
+    def take(self, field: Field, tables: Tables) -> None:
+        """Show the relit ``field``."""
+        self.set(tables)
+
+    def forget(self) -> None:
+        """Drop what waits and what has come out; what is being worked on will be shown still."""
         with self._lock:
-            self._waiting, worker = None, self._worker
+            self._waiting = self._result = None
+
+    def close(self) -> None:
+        """See FieldLight; waits until the worker has felt it."""
+        self.forget()
         self._progress.cancel()
+        worker = self._worker
         if worker is not None:
             worker.join()
 
@@ -75,7 +86,8 @@ class RelitLight(FieldLight):
                     return
             try:
                 # From the bake's own field each time: only it has been measured, whatever the lamps did since.
-                result = self._tables_of(self._field.relight(scene, self._progress))
+                field = self._relight(scene, self._progress)
+                result = field, self._tables_of(field)
             except Cancelled:
                 result = None
             except BakeError as error:

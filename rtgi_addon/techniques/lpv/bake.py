@@ -64,7 +64,7 @@ class LpvBake:
             if not coarser and np.any(lights.flux > 0) and not np.any(volume[0] > 0):
                 raise BakeError("no virtual light lies inside the light propagation volumes", "raise cell_size or add cascades")
             if world.any() and blocking.reflectance is not None:
-                volume = volume + self._reflected(world, blocking)
+                volume = volume + reflected(world, blocking, self.kernels, context.threads)
             propagated.insert(0, self.kernels.lpv_propagate(volume, blocking, self.settings.steps, threads=context.threads,
                                                             progress=part.span(0.4, 1.0)))
             seen.insert(0, world)
@@ -72,26 +72,28 @@ class LpvBake:
         stats = {"rays": 0, "virtual_lights": len(lights.flux), "cells": sum(grid.count for grid in self.grids),
                  "injected_flux": [float(value) for value in lights.flux.sum(axis=0, dtype=np.float64)]}
         return LpvField(self.grids, volumes, params=asdict(self.settings), stats=stats, resampled=self._resample,
-                        relit=self.relight, kernels=self.kernels)
-
-    def _reflected(self, world: np.ndarray, blocking: Blocking) -> np.ndarray:
-        """What surfaces send back of the world's light: a step through faces that let nothing through."""
-        closed = replace(blocking, through=np.zeros_like(blocking.through))
-        return self.kernels.lpv_propagate(world, closed, 1, threads=self.context.threads) - world
+                        relit=self.relight, kernels=self.kernels, bake=self, world_volumes=tuple(seen))
 
     def _resample(self, field: LpvField):
         order = self.settings.order
         return resample(field, self.context, self.context.scene.volumes, order, Progress(), seed=self.seed,
                         threads=self.context.threads, radiance_sh=lambda points: field.radiance_sh(points, order))
 
-    def relight(self, scene: Scene, progress: Progress) -> LpvField:
-        """The field under another scene's lamps and world. Raises BakeError if geometry or materials differ."""
+    def relight(self, scene: Scene, progress: Progress, kernels=None) -> LpvField:
+        """The field under another scene's lamps and world, by ``kernels`` (None: those of the bake). Raises BakeError if geometry
+        or materials differ."""
         other = object.__new__(LpvBake)
         other.__dict__.update(self.__dict__)
-        other.context = self.context.relit(scene)
-        other._maps = sources.capture_maps(other.context, self.kernels, self.grids, self.settings.map_resolution,
+        other.context, other.kernels = self.context.relit(scene), kernels or self.kernels
+        other._maps = sources.capture_maps(other.context, other.kernels, self.grids, self.settings.map_resolution,
                                            progress.span(0.0, 0.4))
         return other.light(progress.span(0.4, 1.0))
+
+
+def reflected(world: np.ndarray, blocking: Blocking, kernels, threads: int | None) -> np.ndarray:
+    """What surfaces send back of the light of ``world`` (4, 3, nz, ny, nx): a step through faces that let nothing through."""
+    closed = replace(blocking, through=np.zeros_like(blocking.through))
+    return kernels.lpv_propagate(world, closed, 1, threads=threads) - world
 
 
 def _geometry_volume(grid: LpvGrid, eyes: list[list[surfels.Surfels]]) -> GeometryVolume:

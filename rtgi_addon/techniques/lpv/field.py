@@ -17,17 +17,20 @@ class LpvField(Field):
     """Accumulated volumes (4, 3, nz, ny, nx) float32 of ``volume_grids``, finest first (see `gather` for what they mean).
 
     ``kernels`` (None: numpy) does the gathering; ``resampled`` makes the probe grids on first demand; ``relit`` makes the field
-    of another scene.
+    of another scene; ``bake`` (a LpvBake, None if read from files) is what it was made by, and ``world_volumes`` what part of the
+    volumes is the world's light, which is traced and not propagated.
     """
 
     technique = "lpv"
 
     def __init__(self, volume_grids: tuple[LpvGrid, ...], volumes: tuple[np.ndarray, ...], *, params: dict, stats: dict,
                  resampled: Callable[["LpvField"], tuple[ProbeGrid, ...]] | None = None,
-                 relit: Callable[[Scene, Progress], "LpvField"] | None = None, kernels=None):
+                 relit: Callable[[Scene, Progress], "LpvField"] | None = None, kernels=None, bake=None,
+                 world_volumes: tuple[np.ndarray, ...] = ()):
         self.volume_grids, self.volumes = tuple(volume_grids), tuple(volumes)
         self.params, self.stats = dict(params), dict(stats)
         self._resampled, self._relit, self._kernels, self._grids = resampled, relit, kernels, None
+        self.bake, self.world_volumes = bake, tuple(world_volumes)
 
     def irradiance(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """See Field."""

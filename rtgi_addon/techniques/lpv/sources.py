@@ -12,7 +12,7 @@ from ...progress import Progress
 from ...transport.context import LightContext
 from ...transport.parallel import CHUNK, chunks, parallel_for
 from ...transport.reflective_shadow_map import ReflectiveShadowMap
-from ...transport.shadow_views import views_of
+from ...transport.shadow_views import ShadowView, views_of
 from .gather import FACE_TOTAL, intensity_of_radiance
 from .grid import FRONT_SOLID_ANGLE, SIDE_SOLID_ANGLE, LpvGrid
 
@@ -30,26 +30,32 @@ class Lights(NamedTuple):
     flux: np.ndarray
 
 
-def capture_maps(context: LightContext, kernels, grids: tuple[LpvGrid, ...], resolution: int,
-                 progress: Progress) -> list[ReflectiveShadowMap]:
-    """The reflective shadow maps of every lamp, ``resolution`` texels a side or fewer if they are many; a sun's is fitted to the
-    coarsest volume.
-
-    Raises BakeError naming a lamp that lights surfaces, but none within the volumes, and if no lamp lights any and nothing else
-    shines.
-    """
+def map_views(context: LightContext, grids: tuple[LpvGrid, ...], resolution: int) -> list[tuple[ShadowView, ...]]:
+    """Each lamp's views, ``resolution`` texels a side or fewer if they are many; a sun's is fitted to the coarsest volume."""
     outermost = grids[-1]
     box = np.stack([np.asarray(outermost.corner) - outermost.cell, outermost.high + outermost.cell])
     bounds = np.array(context.geometry.bounds(), np.float64)
     focus = np.stack([np.maximum(box[0], bounds[0]), np.minimum(box[1], bounds[1])])
     if np.any(focus[0] > focus[1]):
         focus = box
-    count = sum(len(views_of(context, lamp, resolution, focus=focus)) for lamp in range(context.lamps.count))
-    resolution = int(np.clip(np.sqrt(MAX_TEXELS / max(count, 1)), min(resolution, MIN_RESOLUTION), resolution))
+    views = [views_of(context, lamp, resolution, focus=focus) for lamp in range(context.lamps.count)]
+    fitting = np.sqrt(MAX_TEXELS / max(sum(map(len, views)), 1))
+    fewer = int(np.clip(fitting, min(resolution, MIN_RESOLUTION), resolution))
+    return views if fewer == resolution else [views_of(context, lamp, fewer, focus=focus) for lamp in range(len(views))]
+
+
+def capture_maps(context: LightContext, kernels, grids: tuple[LpvGrid, ...], resolution: int,
+                 progress: Progress) -> list[ReflectiveShadowMap]:
+    """The reflective shadow maps of every lamp (see ``map_views``).
+
+    Raises BakeError naming a lamp that lights surfaces, but none within the volumes, and if no lamp lights any and nothing else
+    shines.
+    """
+    outermost = grids[-1]
     maps = []
-    for lamp in range(context.lamps.count):
+    for lamp, views in enumerate(map_views(context, grids, resolution)):
         progress.step(lamp / context.lamps.count, "capturing reflective shadow maps")
-        own = [kernels.capture(context, view) for view in views_of(context, lamp, resolution, focus=focus)]
+        own = [kernels.capture(context, view) for view in views]
         lit = [captured.lights() for captured in own]
         if any(len(texels.flux) for texels in lit) and not any(outermost.inside(texels.positions).any() for texels in lit):
             name = context.scene.lights[lamp].name

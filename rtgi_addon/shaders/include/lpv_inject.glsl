@@ -1,0 +1,22 @@
+// A virtual light becomes a cosine lobe of intensity in the cell in front of its surface (techniques/lpv/injection.py): one point,
+// blended additively into the texel of that cell.
+#include "include/volume.glsl"
+
+void inject_light(vec3 cells, vec3 light_normal, vec3 power)
+{
+  ivec3 resolution = parameters.resolution;
+  ivec3 cell = ivec3(floor(cells + 0.5 * light_normal));
+  lobe = vec4(parameters.per_flux, parameters.per_vector * light_normal.yzx);
+  light_flux = power;
+  vec2 texel = vec2(atlas_texel(cell, resolution, parameters.columns)) + 0.5;
+  gl_Position = is_inside(cell, resolution) ? vec4(texel / parameters.size * 2.0 - 1.0, 0.0, 1.0) : vec4(2.0, 2.0, 2.0, 1.0);
+  gl_PointSize = 1.0;
+}
+
+void inject_nothing()
+{
+  lobe = vec4(0.0);
+  light_flux = vec3(0.0);
+  gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
+  gl_PointSize = 1.0;
+}
