@@ -12,6 +12,8 @@ FIRST_ROUND = 256
 SLOPE = 0.65
 # One probe's difference is one sample of its error: lean on the mean of its neighbours by this share.
 POOLED = 0.5
+# Weight of what earlier rounds said of a probe's error in what the next one makes of it.
+REMEMBERED = 0.5
 # Share of the target left to the sampling of probe rays; the rest is for the surface cache.
 SAMPLING_SHARE = 0.75
 # A round goes this share of the way that the last estimate asks for, so that an overestimate is noticed before it is paid for.
@@ -41,7 +43,10 @@ class ErrorModel:
             rows, n1, n2 = probes[compared], before[compared].astype(float), rays[compared].astype(float)
             difference = self.total[rows] / n1[:, None, None] - sums[compared] / n2[:, None, None]
             spread = n1 ** (-2 * SLOPE) + n2 ** (-2 * SLOPE)
-            self._constant[rows] = np.sqrt((difference**2).sum(axis=(1, 2)) / spread)
+            found = (difference**2).sum(axis=(1, 2)) / spread
+            # One difference may be small by luck, and a probe that stops by it stays wrong: earlier ones keep half the say.
+            known = np.where(np.isnan(self._constant[rows]), found, self._constant[rows] ** 2)
+            self._constant[rows] = np.sqrt((1.0 - REMEMBERED) * found + REMEMBERED * known)
         self.total[probes] += sums
         self.rays[probes] += rays
 
