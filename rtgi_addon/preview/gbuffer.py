@@ -9,7 +9,6 @@ from .programs import OUTPUTS
 from .surfaces import SurfacePass, View
 
 
-
 class GBuffer:
     """Targets of ``width`` × ``height`` texels, row 0 at the bottom.
 
@@ -34,6 +33,7 @@ class GBuffer:
                 surfaces.draw(view, cull=True)
 
 
-def gbuffer_surfaces(scene: Scene, images: Images | None = None) -> SurfacePass:
-    """``scene`` ready to be drawn into G-buffers and shadow maps; ``images`` may be shared with other passes."""
-    return SurfacePass(scene, "gbuffer", images)
+def gbuffer_surfaces(scene: Scene, images: Images | None = None, before: SurfacePass | None = None) -> SurfacePass:
+    """``scene`` ready to be drawn into G-buffers and shadow maps; ``images`` may be shared with other passes;
+    vertices that were sent for ``before`` are not sent again."""
+    return SurfacePass(scene, "gbuffer", images, before)

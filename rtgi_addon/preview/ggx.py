@@ -1,7 +1,7 @@
 """What a GGX layer reflects in all, as a table: the rest of the light is left for what lies below it.
 
-Smith's height-correlated shadowing and masking (Heitz 2014), Schlick's Fresnel term, α = roughness²: E(cos, roughness) = f0·a + f90·b
-(the split sum of Karis 2013), integrated over visible normals (Heitz 2018).
+Smith's height-correlated shadowing and masking (Heitz 2014), Schlick's Fresnel term, α = roughness²: E(cos, roughness) = f0·a +
+f90·b (the split sum of Karis 2013), integrated over visible normals (Heitz 2018).
 """
 
 from functools import cache

@@ -33,10 +33,12 @@ class LampSample:
         return views_of_light(self.placed, bounds, resolution, focus=focus, area_points=1)
 
 
-def sample_lamp(light: Light, u: np.ndarray) -> LampSample:
-    """The point of ``light`` for ``u`` (3,) in [0, 1)."""
-    sample = {SUN: _sun, POINT: _point, SPOT: _spot, AREA: _area}[_KINDS[type(light)]](light, np.asarray(u, np.float64))
-    return LampSample(light, sample[0], {**_DARK, "kind": _KINDS[type(light)], **sample[1]})
+def sample_lamp(light: Light, u: np.ndarray, gain: float = 1.0) -> LampSample:
+    """The point of ``light`` for ``u`` (3,) in [0, 1), as if it were ``gain`` times as bright."""
+    kind = _KINDS[type(light)]
+    placed, uniforms = {SUN: _sun, POINT: _point, SPOT: _spot, AREA: _area}[kind](light, np.asarray(u, np.float64))
+    strength = gain * np.broadcast_to(np.asarray(uniforms["strength"], np.float64), (3,))
+    return LampSample(light, placed, {**_DARK, "kind": kind, **uniforms, "strength": strength})
 
 
 # The members of the struct that not every lamp has.

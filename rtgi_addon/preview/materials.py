@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import gpu
 import numpy as np
 
-from ..scene import Channel, Material, Texture
+from ..scene import Channel, Material, Scene, Texture
 from .programs import MATERIAL_INPUTS
 from .textures import upload
 
@@ -66,6 +66,11 @@ class Images:
             # Kept with the texture itself, so that its id stays its own.
             self._uploaded[id(texture)] = texture, _upload(texture)
         return self._uploaded[id(texture)][1]
+
+    def keep(self, scene: Scene) -> None:
+        """Let go of images that no material of ``scene`` reads."""
+        used = {id(getattr(material, name).texture) for material in scene.materials for name in MATERIAL_INPUTS}
+        self._uploaded = {key: entry for key, entry in self._uploaded.items() if key in used}
 
 
 def _upload(texture: Texture) -> gpu.types.GPUTexture:

@@ -1,38 +1,36 @@
 """The preview's pictures: G-buffer, direct light through shadow maps, indirect light of a field, averaged over jittered frames."""
 
+from dataclasses import replace
+
 import gpu
 import numpy as np
 
 from ..numerics.sampling import sobol_owen
-from ..scene import Instance, Light, Mesh, Scene
+from ..scene import Instance, Material, Mesh, Scene
 from ..techniques.base import Field, validate_settings
 from .camera_view import CameraView
-from .device import dispatch
+from .direct_light import DirectLight
 from .film import Background, Film
 from .gbuffer import GBuffer, gbuffer_surfaces
-from .ggx import energy_table
 from .indirect import make_indirect
 from .indirect_pass import Indirect, draw_indirect
-from .lamp_sample import sample_lamp
 from .materials import Images
 from .pixel_filter import filter_offset
-from .programs import DIRECT_LIGHT, OUTPUTS
 from .settings import PASSES, PreviewSettings
-from .shadow_maps import ShadowMap, shadow_parts
 from .surfaces import SurfacePass
-from .textures import download, empty, upload
+from .textures import download, empty
 
-# Dimensions of a frame's random numbers: two of the pixel filter, three of a shadow map's place; then three for every lamp.
-_FRAME_DIMENSIONS, _LAMP_DIMENSIONS = 5, 3
+_FILTER_SEED = 0
 
 
 class PreviewRenderer:
     """Renders ``scene`` with the indirect light of ``field`` (None: the world's own, unshadowed). All of it is GPU work: main
-    thread only. ``passes`` of PASSES are what frames are kept of.
+    thread only. ``passes`` of PASSES are what frames are kept of. ``baked`` is the scene that ``field`` was baked from (None:
+    ``scene``, which must begin with the lamps and the world of the bake): its geometry goes on reflecting when lamps move.
     """
 
     def __init__(self, scene: Scene, field: Field | None = None, settings: PreviewSettings | None = None,
-                 passes: tuple[str, ...] = PASSES):
+                 passes: tuple[str, ...] = PASSES, baked: Scene | None = None):
         self.settings = settings or PreviewSettings()
         validate_settings(self.settings)
         self.scene, self.field, self._passes = scene, field, tuple(passes)
@@ -40,11 +38,11 @@ class PreviewRenderer:
         self._surfaces = _surfaces(scene, self._images)
         self._bounds = scene_bounds(scene)
         self._background = Background(scene.world)
-        self._ggx_energy = upload(energy_table())
-        self._indirect: Indirect = make_indirect(field, scene)
+        self._lamps = DirectLight(self.settings)
+        self._baked = baked or scene
+        self._indirect: Indirect = make_indirect(field, self._baked)
         self._gbuffer: GBuffer | None = None
         self._film: Film | None = None
-        self._shadow_map: ShadowMap | None = None
         self._view: CameraView | None = None
 
     @property
@@ -56,6 +54,15 @@ class PreviewRenderer:
     def busy(self) -> bool:
         """True while a worker makes light that a later frame will begin anew with."""
         return self._indirect.busy
+
+    @property
+    def error(self) -> str:
+        """Why indirect light does not follow the scene any more, or nothing."""
+        return self._indirect.error or ""
+
+    def close(self) -> None:
+        """Stop workers; this renderer is not used again."""
+        self._indirect.close()
 
     @property
     def size(self) -> tuple[int, int]:
@@ -85,12 +92,14 @@ class PreviewRenderer:
             self._background = Background(scene.world)
         if not (_same(before.meshes, scene.meshes) and _same(before.materials, scene.materials)
                 and self._surfaces is not None and self._surfaces.can_move(scene)):
-            self._surfaces = _surfaces(scene, self._images)
+            self._images.keep(scene)
+            self._surfaces = _surfaces(scene, self._images, self._surfaces)
             self._bounds = scene_bounds(scene)
         elif not _same(before.instances, scene.instances):
             self._surfaces.move(scene)
             self._bounds = scene_bounds(scene)
-        self._indirect.follow(scene)
+        if scene.world is not before.world or not _same(before.lights, scene.lights):
+            self._indirect.follow(replace(self._baked, lights=scene.lights, world=scene.world))
         self.reset()
 
     def frame(self, view: CameraView, size: tuple[int, int]) -> None:
@@ -105,11 +114,11 @@ class PreviewRenderer:
             self._view = view
             self.reset()
         index = self._film.samples
-        numbers = _frame_numbers(index)
-        offset = filter_offset(numbers[:2]) if index else np.zeros(2)
+        offset = filter_offset(sobol_owen(1, 2, _FILTER_SEED, start=index)[0]) if index else np.zeros(2)
         self._gbuffer.draw(self._surfaces, view.drawn(scaled, offset, index))
         inputs = {**self._gbuffer.textures, "direct": self._direct, "irradiance": self._irradiance}
-        self._light(view, inputs, index, numbers[2:])
+        if self._surfaces is not None:
+            self._lamps.draw(self.scene, self._surfaces, self._bounds, view, index, inputs, self._direct)
         draw_indirect(self._indirect, inputs, self._irradiance)
         self._film.add(view, offset, inputs, self._background, self.settings.film_transparent)
 
@@ -117,27 +126,6 @@ class PreviewRenderer:
         self._film = Film(size, self._passes)
         self._gbuffer = GBuffer(*size)
         self._direct, self._irradiance = empty(*size), empty(*size)
-
-    def _light(self, view: CameraView, inputs, index: int, jitter: np.ndarray) -> None:
-        """Fill the texture of direct light: lamp by lamp, map by map."""
-        self._direct.clear(format="FLOAT", value=(0.0,) * 4)
-        if self._surfaces is None:
-            return
-        resolution = self.settings.shadow_resolution
-        if self._shadow_map is None or self._shadow_map.resolution != resolution:
-            self._shadow_map = ShadowMap(resolution)
-        size = self._film.size
-        pose = np.asarray(view.world_from_camera)
-        camera = {"position_world": pose[:3, 3], "forward_world": -pose[:3, 2], "orthographic": int(view.orthographic),
-                  "size": size}
-        gbuffer = {f"gbuffer_{name}": inputs[name] for name in OUTPUTS}
-        for number, light in enumerate(self.scene.lights):
-            sample = sample_lamp(light, _lamp_numbers(index, number))
-            for part in shadow_parts(sample, view, self._bounds, resolution, self.settings.shadow_cascades, jitter):
-                if part.view is not None:
-                    self._shadow_map.draw(self._surfaces, part.view, index)
-                dispatch(DIRECT_LIGHT, size, uniforms={"lamp": sample.uniforms, "shadow": part.uniforms, "camera": camera},
-                         samplers={"shadow_map": self._shadow_map.texture, "ggx_energy": self._ggx_energy, **gbuffer}, images={"direct": self._direct})
 
 
 def scene_bounds(scene: Scene) -> np.ndarray:
@@ -159,19 +147,11 @@ def _box(mesh: Mesh) -> np.ndarray | None:
     return np.stack(np.meshgrid(*ends.T, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
-def _surfaces(scene: Scene, images: Images) -> SurfacePass | None:
-    return gbuffer_surfaces(scene, images) if any(len(scene.meshes[item.mesh].triangles) for item in scene.instances) else None
+def _surfaces(scene: Scene, images: Images, before: SurfacePass | None = None) -> SurfacePass | None:
+    is_empty = not any(len(scene.meshes[item.mesh].triangles) for item in scene.instances)
+    return None if is_empty else gbuffer_surfaces(scene, images, before)
 
 
-def _same(before: tuple[Mesh | Instance | Light, ...], after: tuple) -> bool:
+def _same(before: tuple[Mesh | Instance | Material, ...], after: tuple) -> bool:
     """True if both hold the very same objects, which are frozen."""
     return len(before) == len(after) and all(a is b for a, b in zip(before, after, strict=True))
-
-
-def _frame_numbers(index: int) -> np.ndarray:
-    return sobol_owen(1, _FRAME_DIMENSIONS, 0, start=index)[0]
-
-
-def _lamp_numbers(index: int, lamp: int) -> np.ndarray:
-    # A scramble of its own for every lamp: their points are as even as one lamp's, and not in step.
-    return sobol_owen(1, _LAMP_DIMENSIONS, lamp + 1, start=index)[0]

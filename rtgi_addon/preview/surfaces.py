@@ -51,12 +51,17 @@ class _Draw:
 
 
 class SurfacePass:
-    """The surfaces of ``scene``, ready for pass ``name`` of SURFACE_PASSES and for those that read no more of a material. Triangles
-    are numbered instance by instance, as in transport.geometry.Geometry."""
+    """The surfaces of ``scene``, ready for pass ``name`` of SURFACE_PASSES and for those that read no more of a material.
 
-    def __init__(self, scene: Scene, name: str, images: Images | None = None):
+    Triangles are numbered instance by instance, as in transport.geometry.Geometry. ``images`` may be shared with other passes; of
+    ``before``, the same pass over an earlier scene, the vertices of meshes that are the same objects are taken over."""
+
+    def __init__(self, scene: Scene, name: str, images: Images | None = None, before: "SurfacePass | None" = None):
         self._inputs, self._name = SURFACE_PASSES[name][0], name
         self._images = images or Images()
+        # Vertices by mesh, material slot and what the material reads of them; with the mesh, so that its id stays its own.
+        self._batches: dict[tuple, tuple[Mesh, gpu.types.GPUBatch]] = {}
+        self._sent = {} if before is None else before._batches
         self._groups = _groups(scene)
         self.move(scene)
         self._draws, first = [], 0
@@ -65,9 +70,9 @@ class SurfacePass:
             mesh = scene.meshes[mesh_index]
             for old in np.unique(mesh.triangle_material):
                 material = materials[dict(override).get(int(old), int(old))]
-                triangles = np.flatnonzero(mesh.triangle_material == old).astype(np.int32)
-                self._draws.append(self._draw_of(mesh, triangles, material, first, len(members), mirrored))
+                self._draws.append(self._draw_of(mesh, int(old), material, first, len(members), mirrored))
             first += len(members)
+        self._sent = {}
 
     def can_move(self, scene: Scene) -> bool:
         """True if ``scene``, which has the same meshes and materials, differs in nothing but where instances stand."""
@@ -78,14 +83,23 @@ class SurfacePass:
         ordered = [index for members in self._groups.values() for index in members]
         self._instances = upload(fold(_instance_rows(scene)[ordered].reshape(len(ordered), -1)))
 
-    def _draw_of(self, mesh: Mesh, triangles: np.ndarray, material: Material, first: int, count: int, mirrored: bool) -> _Draw:
+    def _draw_of(self, mesh: Mesh, slot: int, material: Material, first: int, count: int, mirrored: bool) -> _Draw:
         slots = Slots(material, self._inputs)
-        batch = gpu.types.GPUBatch(type="TRIS", buf=vertex_buffer(_attributes(mesh, triangles, slots)))
+        batch = self._batch(mesh, slot, slots)
         buffer = uniform_buffer(MATERIAL, uniforms(material, slots, self._inputs, first))
         images = {f"{name}_image": self._images.get(getattr(material, name).texture) for name in self._inputs}
         backs = "FRONT" if mirrored else "BACK"
         layout = len(slots.uv_layers), len(slots.attributes), mesh.corner_normals_local is not None
         return _Draw(layout, batch, buffer, images, count, backs if material.backface_culling else "NONE")
+
+    def _batch(self, mesh: Mesh, slot: int, slots: Slots) -> gpu.types.GPUBatch:
+        key = id(mesh), slot, tuple(slots.uv_layers), tuple(slots.attributes)
+        sent = self._batches.get(key) or self._sent.get(key)
+        if sent is None:
+            triangles = np.flatnonzero(mesh.triangle_material == slot).astype(np.int32)
+            sent = mesh, gpu.types.GPUBatch(type="TRIS", buf=vertex_buffer(_attributes(mesh, triangles, slots)))
+        self._batches[key] = sent
+        return sent[1]
 
     def draw(self, view: View, samplers: Mapping[str, gpu.types.GPUTexture] | None = None, *, cull: bool = False,
              name: str | None = None) -> None:

@@ -57,8 +57,9 @@ class Material:
 
     ``albedo`` is the hemispherical reflectance that a diffuse transport uses (already reduced by metallic and extended by
     what a specular lobe reflects: the extraction's docstring says how); ``base_color``, ``metallic``, ``roughness`` and
-    ``specular`` (what the dielectric layer reflects at normal incidence) are kept for the preview. ``emission`` is radiance [W·sr⁻¹·m⁻²], from both faces as in Cycles. ``alpha`` is coverage:
-    ``alpha_threshold`` None means a ray passes with probability 1 − alpha, a number means a hard cut at it.
+    ``specular`` (what the dielectric layer reflects at normal incidence) are kept for the preview. ``emission`` is radiance
+    [W·sr⁻¹·m⁻²], from both faces as in Cycles. ``alpha`` is coverage: ``alpha_threshold`` None means a ray passes with
+    probability 1 − alpha, a number means a hard cut at it.
     ``backface_culling`` is the user's statement that the surface is seen from its front only; light transport is two-sided
     all the same, as in Cycles. ``extraction`` says how it was read: 'nodes' or 'cycles-bake'.
     """
