@@ -151,3 +151,7 @@ class Technique(ABC):
              checkpoint: Checkpoint | None = None) -> Field:
         """Bake every volume of ``scene``. The same ``rng`` seed gives the same bytes for any number of ``threads``
         (None = every core). Raises BakeError for what the user can mend, Cancelled when asked to stop."""
+
+    def sweep(self) -> tuple:
+        """Settings from cheap to dear that a chart of speed against accuracy measures, the defaults among them."""
+        return (self.Settings(),)

@@ -7,6 +7,7 @@ B. Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection" (1997). Transpare
 import numpy as np
 
 from .geometry import Geometry
+from .ray_counter import record
 from .rays import Hits
 
 # Ray-triangle pairs per block: about 200 MB of float64 temporaries.
@@ -26,6 +27,7 @@ class BruteForceTracer:
     def intersect(self, origins, directions, t_max=None) -> Hits:
         """See Tracer."""
         n = len(origins)
+        record(n)
         limits = np.broadcast_to(np.asarray(np.inf if t_max is None else t_max, np.float64), (n,))
         hits = Hits(np.full(n, -1, np.int32), np.zeros(n, np.float32), np.zeros(n, np.float32), np.full(n, np.inf, np.float32))
         step = max(1, PAIRS // max(1, len(self._v0)))

@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from .geometry import Geometry
+from .ray_counter import record
 from .rays import INFINITE, Hits
 from .vectors import dot
 
@@ -36,6 +37,7 @@ class BVHTreeTracer:
 
     def intersect(self, origins, directions, t_max=None) -> Hits:
         """See Tracer."""
+        record(len(origins))
         length, limits = self._distances(directions, t_max)
         cast = self._tree.ray_cast
         found = [cast(origin, direction, limit)[2:] for origin, direction, limit in
@@ -49,6 +51,7 @@ class BVHTreeTracer:
 
     def occluded(self, origins, directions, t_max=None) -> np.ndarray:
         """See Tracer."""
+        record(len(origins))
         cast, (_, limits) = self._tree.ray_cast, self._distances(directions, t_max)
         return np.fromiter((cast(origin, direction, limit)[2] is not None for origin, direction, limit in
                             zip(origins.tolist(), directions.tolist(), limits.tolist(), strict=True)), bool, len(origins))

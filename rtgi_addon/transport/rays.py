@@ -10,6 +10,7 @@ import numpy as np
 
 from .geometry import Geometry
 from .parallel import CHUNK, chunks, parallel_for
+from .ray_counter import record
 from .surfaces import Surfaces
 from .vectors import dot
 
@@ -101,6 +102,7 @@ class EmbreeTracer:
         return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
     def _run(self, origins, directions, t_max, function):
+        record(len(origins))
         spans = chunks(len(origins)) or [slice(0, 0)]
         limits = None if t_max is None else np.broadcast_to(np.asarray(t_max, np.float32), (len(origins),))
         return parallel_for(lambda i: function(origins[spans[i]], directions[spans[i]],

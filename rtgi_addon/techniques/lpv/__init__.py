@@ -61,5 +61,9 @@ class LightPropagationVolumes(Technique):
         progress.stage("propagation")
         return bake.light(progress.span(0.4, 1.0))
 
+    def sweep(self) -> tuple[LpvSettings, ...]:
+        """Resolutions, and the few steps that games take."""
+        return (LpvSettings(resolution=8), LpvSettings(steps=8), LpvSettings(), LpvSettings(resolution=32))
+
 
 TECHNIQUE = LightPropagationVolumes()

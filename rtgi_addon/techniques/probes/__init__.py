@@ -53,6 +53,11 @@ class Probes(Technique):
         progress.stage("field")
         return _field(scene, settings, bakes, [bake.grids() for bake in bakes])
 
+    def sweep(self) -> tuple[ProbeSettings, ...]:
+        """Target errors, and SH of order 1, which engines with small probes store."""
+        return (ProbeSettings(error=0.1), ProbeSettings(error=0.03), ProbeSettings(order=1), ProbeSettings(),
+                ProbeSettings(error=0.004))
+
 
 def _field(scene: Scene, settings: ProbeSettings, bakes: list[ProbeBake], grids) -> ProbeField:
     """The field of all bakes, in the order of the scene's volumes, with what it takes to relight it."""

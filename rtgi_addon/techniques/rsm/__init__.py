@@ -50,5 +50,10 @@ class ReflectiveShadowMaps(Technique):
         context = LightContext(scene, threads)
         return Capture(context, settings, seed, kernels or NUMPY).field(progress)
 
+    def sweep(self) -> tuple[RsmSettings, ...]:
+        """Samples, without occlusion as in the paper, and with shadow rays."""
+        return (RsmSettings(resolution=128, samples=64), RsmSettings(), RsmSettings(visibility=True),
+                RsmSettings(samples=1600, visibility=True))
+
 
 TECHNIQUE = ReflectiveShadowMaps()

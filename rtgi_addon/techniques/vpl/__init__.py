@@ -66,6 +66,10 @@ class VirtualPointLights(Technique):
         field.stats["rays"] = probes * (field.lights.count + field.lights.distant_count)
         return field
 
+    def sweep(self) -> tuple[VplSettings, ...]:
+        """Numbers of virtual lights, to which time is proportional."""
+        return (VplSettings(lights=64), VplSettings(lights=256), VplSettings(lights=1024), VplSettings())
+
 
 def mean_bound(context: LightContext, lights: LightSet) -> float | None:
     """The bound [m⁻²] at which a middling virtual light gives a receiver the mean irradiance of surfaces seen from the volumes, so

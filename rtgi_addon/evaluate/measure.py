@@ -1,0 +1,193 @@
+"""One technique at one setting on one scene: what it costs and how far off it is.
+
+``Yard`` holds what all measurements of a scene share: ray tracer, receivers, probes and references. ``Yard.measure`` bakes and
+compares. A planner that wants other receivers makes another yard, or passes ``receivers`` with another seed.
+
+Each bake is held to the reference in several places, which separates the causes of error:
+
+- ``surface``: the technique's own field at all receivers, surface normals and tilted ones;
+- ``own_normals``: of these only the receivers under the surface's own normal;
+- ``shipped``: the same receivers lit by the probes that the bundle holds, as an engine would be;
+- ``probes``: the SH of usable probes, where nothing is interpolated;
+- ``known``: ``surface`` against only that light which the technique knows (``Technique.knows``).
+"""
+
+from dataclasses import dataclass, field, replace
+from time import perf_counter
+
+import numpy as np
+
+from ..errors import BakeError
+from ..numerics import sh
+from ..numerics.grid import lattice_points
+from ..progress import Progress
+from ..scene import Scene
+from ..techniques import Field, Technique
+from ..techniques.base import KNOWN_LIGHT
+from ..techniques.probes.field import ProbeField
+from ..transport.context import LightContext
+from .costs import Costs, metered
+from .metrics import energy_ratio, leak_ratio, relative_rmse, relmse
+from .receivers import Receivers, open_probes, surface_receivers
+from .references import PathReference, Reference, Truth
+
+# Receivers with less than this share of the mean irradiance count as dark: what they get too much is leaked.
+DARK = 0.01
+# Bands that probes are compared in, the most that any engine stores.
+PROBE_ORDER = 2
+PLACES = ("surface", "own_normals", "shipped", "probes", "known")
+
+
+@dataclass(frozen=True)
+class Errors:
+    """How far an estimate is off in one place, the reference's variance taken out (metrics.py).
+
+    ``error`` relative RMSE; ``relmse`` mean((x − r)²/(r² + ε)), ε a hundredth of the mean square of r, with the reference's noise
+    in it; ``bias`` signed, Σ(x − r)/Σr; ``energy`` Σx/Σr; ``leak`` mean irradiance of dark receivers relative to the others, and
+    ``true_leak`` the reference's own (None: no receiver is dark); ``minimum`` the least irradiance or mean radiance, relative to
+    the reference's mean.
+    """
+
+    error: float
+    relmse: float
+    bias: float
+    energy: float
+    leak: float | None
+    true_leak: float | None
+    minimum: float
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One bake: ``costs`` of everything `rtgi bake` does but writing, ``lookup_seconds`` for one receiver of the technique's own
+    field (wall clock), ``field_bytes`` of what the field keeps, ``errors`` by place and ``estimates``, the arrays behind them;
+    ``baked`` is the field itself."""
+
+    technique: str
+    settings: object
+    seed: int
+    costs: Costs
+    lookup_seconds: float
+    field_bytes: int
+    errors: dict[str, Errors]
+    estimates: dict[str, np.ndarray] = field(repr=False)
+    baked: Field | None = field(repr=False, default=None)
+
+
+class Yard:
+    """A scene made ready to measure on. ``scene``'s volumes lose their own settings: what is measured is what is said.
+
+    ``receivers`` are made at the scene's usable probes unless given; ``reference`` is the path tracer unless given. References are
+    traced when they are first needed.
+    """
+
+    def __init__(self, scene: Scene, *, points: int = 128, normals_per_point: int = 4, probes: int = 64, noise: float = 0.01,
+                 seed: int = 0, threads: int | None = None, receivers: Receivers | None = None,
+                 reference: Reference | None = None):
+        """Raises BakeError if no probe is usable or nothing can be seen from any."""
+        self.scene = replace(scene, volumes=tuple(replace(volume, settings={}) for volume in scene.volumes))
+        self.threads = threads
+        if not scene.volumes:
+            raise BakeError("the scene has no probe volume", "add a Light Probe Volume")
+        self.context = LightContext(self.scene, threads)
+        self.usable = open_probes(self.context, self.scene.volumes)
+        if not len(self.usable):
+            raise BakeError("no probe lies in the open", "move the Light Probe Volume out of geometry")
+        lattice = np.concatenate([lattice_points(volume.world_from_local, volume.resolution).reshape(-1, 3)
+                                  for volume in self.scene.volumes])
+        self.receivers = receivers if receivers is not None else surface_receivers(
+            self.context, lattice[self.usable], points, normals_per_point, seed)
+        if not len(self.receivers.points):
+            raise BakeError("no surface can be seen from any probe", "move the Light Probe Volume to the geometry")
+        chosen = np.random.default_rng([seed, 0x7072]).permutation(len(self.usable))[:probes]
+        self.probe_rows = np.sort(self.usable[chosen])
+        self.probe_points = lattice[self.probe_rows].astype(np.float32)
+        self.path_reference = PathReference(self.context, noise)
+        self.reference = reference or self.path_reference
+        self._truths: dict[object, Truth] = {}
+
+    def prepare(self, known: list[frozenset[str]], progress: Progress) -> None:
+        """Trace the references now: of all light, and of each set of light sources in ``known``."""
+        wanted = [KNOWN_LIGHT, "probes", *dict.fromkeys(light for light in known if light != KNOWN_LIGHT)]
+        for number, what in enumerate(wanted):
+            self._truth(what, progress.span(number / len(wanted), (number + 1) / len(wanted)))
+
+    @property
+    def floor(self) -> float:
+        """The least error that this yard can tell from none: with the reference's variance subtracted, what is left of it is the
+        fourth root of 2 over the number of independent values of its noise (of a sum of so many squared normals)."""
+        return self.truth.noise * (2.0 / len(self.receivers.points)) ** 0.25
+
+    @property
+    def truth(self) -> Truth:
+        """Irradiance (n, 3) at the receivers."""
+        return self._truth(KNOWN_LIGHT)
+
+    @property
+    def probe_truth(self) -> Truth:
+        """SH (p, 9, 3) at the probes."""
+        return self._truth("probes")
+
+    @property
+    def dark(self) -> np.ndarray:
+        """(n,) bool: receivers that get next to no light."""
+        brightness = self.truth.mean.sum(axis=1)
+        return brightness < DARK * brightness.mean()
+
+    def measure(self, technique: Technique, settings, seed: int, progress: Progress | None = None, **options) -> Run:
+        """Bake with ``technique`` and compare. ``options`` go to its ``bake``. Raises BakeError, Cancelled."""
+        progress = progress or Progress()
+        with metered() as costs:
+            baked = technique.bake(self.scene, settings, np.random.default_rng(seed), progress.span(0.0, 0.9),
+                                   threads=self.threads, **options)
+            grids = baked.grids()
+        progress.step(0.9, "looking up receivers")
+        started = perf_counter()
+        surface = baked.irradiance(self.receivers.points, self.receivers.normals)
+        lookup = (perf_counter() - started) / len(surface)
+        probes = baked if isinstance(baked, ProbeField) else ProbeField(grids, includes_direct=baked.includes_direct)
+        coefficients = np.concatenate([grid.sh.reshape(-1, *grid.sh.shape[3:]) for grid in grids])[self.probe_rows]
+        estimates = {"surface": surface, "own_normals": surface[self.receivers.own],
+                     "shipped": probes.irradiance(self.receivers.points, self.receivers.normals), "probes": coefficients}
+        if technique.knows != KNOWN_LIGHT:
+            estimates["known"] = surface
+        errors = {place: self._errors(place, estimate, technique) for place, estimate in estimates.items()}
+        return Run(technique.name, settings, seed, costs, lookup, sum(array.nbytes for array in baked.arrays().values()),
+                   errors, estimates, baked)
+
+    def truth_for(self, place: str, estimate: np.ndarray, technique: Technique) -> Truth:
+        """The reference that ``estimate`` in ``place`` (of PLACES) is held to, of its shape."""
+        if place == "probes":
+            count = min(estimate.shape[1], sh.coefficient_count(PROBE_ORDER))
+            return Truth(*(part[:, :count] for part in self.probe_truth))
+        if place == "known":
+            return self._truth(technique.knows)
+        return Truth(*(part[self.receivers.own] for part in self.truth)) if place == "own_normals" else self.truth
+
+    def _errors(self, place: str, estimate: np.ndarray, technique: Technique) -> Errors:
+        truth = self.truth_for(place, estimate, technique)
+        leak = true_leak = None
+        if place == "probes":
+            estimate = estimate[:, :truth.mean.shape[1]]
+            level = truth.mean[:, 0]
+            least = estimate[:, 0]
+        else:
+            level, least = truth.mean, estimate
+            dark = self.dark[self.receivers.own] if place == "own_normals" else self.dark
+            if dark.any() and not dark.all():
+                leak, true_leak = leak_ratio(estimate, dark, ~dark), leak_ratio(truth.mean, dark, ~dark)
+        energy, mean = energy_ratio(estimate, truth.mean).value, float(np.mean(level))
+        return Errors(relative_rmse(estimate, truth.mean, truth.variance), relmse(estimate, truth.mean), energy - 1.0, energy, leak,
+                      true_leak, float(np.min(least)) / mean if mean > 0 else 0.0)
+
+    def _truth(self, what, progress: Progress | None = None) -> Truth:
+        if what not in self._truths:
+            progress = progress or Progress()
+            if what == "probes":
+                truth = self.reference.probes(self.probe_points, PROBE_ORDER, progress)
+            elif what == KNOWN_LIGHT:
+                truth = self.reference.irradiance(self.receivers, progress)
+            else:
+                truth = self.path_reference.irradiance(self.receivers, progress, what)
+            self._truths[what] = truth
+        return self._truths[what]
