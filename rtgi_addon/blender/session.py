@@ -3,9 +3,7 @@
 Everything is kept by scene name, because datablocks do not survive undo.
 """
 
-from copy import copy
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import bpy
 
@@ -30,18 +28,9 @@ class Baked:
     field: Field
     scene: Scene
 
-    @cached_property
-    def shown(self) -> Field:
-        """The field as a preview shows it: relit by the lamps and the world of a scene, whatever else has changed there since the
-        bake. (The panel says that the bake is out of date.)"""
-        if not hasattr(self.field, "relight"):
-            return self.field
-        shown = copy(self.field)
-        shown.relight = self.relight
-        return shown
-
     def relight(self, scene: Scene, progress: Progress | None = None) -> Field:
-        """The field under the lamps and the world of ``scene``. Raises BakeError if it cannot be relit, Cancelled."""
+        """The field under the lamps and the world of ``scene``, whatever else has changed there since the bake. Raises BakeError if
+        it cannot be relit, Cancelled."""
         return self.field.relight(replace(self.scene, lights=scene.lights, world=scene.world), progress)
 
 

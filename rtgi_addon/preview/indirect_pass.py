@@ -21,9 +21,12 @@ FRAME = UniformStruct("IndirectFrame", (("ivec2", "size"),))
 
 class Indirect(Protocol):
     """One technique's indirect light on the GPU: ``program`` made by ``indirect_program``, and the ``uniforms`` and ``samplers`` of
-    the names that were given to it."""
+    the names that were given to it. ``includes_direct`` says that the light of lamps is in it already; ``error`` why it does not
+    follow the scene, or None."""
 
     program: Program
+    includes_direct: bool
+    error: str | None
 
     @property
     def uniforms(self) -> Mapping[str, object]:
@@ -65,6 +68,7 @@ def draw_indirect(indirect: Indirect, gbuffer: Mapping[str, gpu.types.GPUTexture
 class WorldLight:
     """The light of the world alone, as if nothing stood in its way: what is shown where there is no bake."""
 
+    includes_direct, error = False, None
     program = indirect_program("indirect_world", (("world_light", UniformStruct("WorldLight", (("vec4", "cosine_sh", 9),))),))
 
     def __init__(self, scene: Scene):

@@ -29,7 +29,7 @@ def shown_for(scene: bpy.types.Scene) -> Shown:
     technique = get(scene.rtgi.technique)
     baked = session.baked.get((scene.name, technique.name))
     if baked is not None:
-        return Shown(baked.shown, "", baked)
+        return Shown(baked.field, "", baked)
     return _from_disk(scene, technique)
 
 

@@ -1,6 +1,7 @@
 """A viewport: brings its renderer up to date with the scene, draws one sample more, and says what it shows."""
 
 import traceback
+from dataclasses import replace
 
 import numpy as np
 
@@ -8,7 +9,7 @@ from ...errors import BakeError
 from ..preview_settings import preview_settings
 from ..session import session
 from .live import LiveScene, live_scene
-from .shown import Shown, shown_for
+from .shown import Shown, same_light, shown_for
 
 STALE = "The bake is out of date"
 
@@ -28,6 +29,9 @@ class Viewport:
         self._size = (0, 0)
         self._broken = ""
         self._begun = False
+
+    def __del__(self):
+        self.close()
 
     def update(self, engine, context, depsgraph) -> None:
         """Take in what has changed. No GPU work: there may be no context."""
@@ -62,8 +66,13 @@ class Viewport:
         from ...preview.renderer import PreviewRenderer
         settings = preview_settings(scene, final=False)
         if self._renderer is None or settings != self._settings or shown.field is not self._field:
-            self._renderer = PreviewRenderer(live.scene, shown.field, settings, (settings.mode,))
-            self._settings, self._field = settings, shown.field
+            self.close()
+            baked = None if shown.baked is None else shown.baked.scene
+            begun = live.scene
+            if baked is not None and not same_light(baked, begun):
+                begun = replace(begun, lights=baked.lights, world=baked.world)
+            self._renderer = PreviewRenderer(begun, shown.field, settings, (settings.mode,), baked)
+            self._settings, self._field, self._seen = settings, shown.field, None
         self._renderer.update(live.scene)
         region, view = context.region, context.region_data
         seen = CameraView(np.array(view.view_matrix.inverted(), np.float64), np.array(view.window_matrix, np.float64))
@@ -81,10 +90,16 @@ class Viewport:
         """True while another frame would change the picture."""
         return self._renderer.busy or self._renderer.samples < self._settings.samples
 
+    def close(self) -> None:
+        """Let go of the renderer and its workers."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
     def _status(self, scene, live: LiveScene, shown: Shown) -> str:
         parts = [f"Sample {self._renderer.samples} of {self._settings.samples}"]
         if self._renderer.busy:
             parts.append("Relighting")
         if is_stale(scene, shown):
             parts.append(STALE)
-        return " | ".join([*parts, *(text for text in (shown.note, live.error) if text)])
+        return " | ".join([*parts, *(text for text in (shown.note, live.error, self._renderer.error) if text)])
