@@ -113,6 +113,17 @@ LPV_GATHER = Program(
     samplers=("receivers", *(f"light_{name}" for name in _RGB)), local_size=_GROUP,
     images=(Image("irradiance", access="READ_WRITE"),))
 
+# A captured map made ready to be sampled, row by row: strengths summed, quantized and summed up along each row, and stored.
+_ROWS = (64, 1)
+RSM_SUM_ROWS = Program("rsm_sum_rows", samplers=("map_flux",), images=(Image("rows"),), local_size=_ROWS)
+RSM_QUANTIZE = Program("rsm_quantize", samplers=("map_flux", "rows"), images=(Image("quantized_rows"), Image("running", "R32F")),
+                       local_size=_ROWS)
+RSM_STORE = Program(
+    "rsm_store", uniforms=(("parameters", UniformStruct("RsmStoreParameters", (
+        ("vec3", "eye"), ("int", "orthographic"), ("vec3", "forward"), ("float", "max_slant"), ("ivec2", "place")))),),
+    samplers=("map_position", "map_normal", "map_flux", "map_power", "quantized_rows", "running"), local_size=_ROWS,
+    images=(Image("texels"), Image("cumulative", "R32F")))
+
 RSM_GATHER = Program(
     "rsm_gather", uniforms=(("parameters", UniformStruct("RsmGatherParameters", (
         ("int", "size"), ("int", "count"), ("int", "first_row"), ("int", "in_disk"), ("int", "by_flux"),

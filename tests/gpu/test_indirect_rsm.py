@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scene_builders as build
-from receivers import directions, points_in, relative_error
+from receivers import directions, points_in, relative_error, waited
 
 from rtgi_addon.progress import Progress
-from rtgi_addon.scene import SunLight
+from rtgi_addon.scene import AreaLight, SpotLight, SunLight
 from rtgi_addon.techniques.rsm import TECHNIQUE, RsmSettings
 
 # Float sums in another order. A sample on the border of two texels may fall either way: one of some hundred, in few receivers.
@@ -70,3 +70,51 @@ def test_more_maps_than_a_row_of_the_sheet_holds():
     sheet = Sheet([2048, 1024, 2048, 512, 2048, 2048])
     assert sheet.places == [(0, 0), (2048, 0), (3072, 0), (0, 2048), (512, 2048), (2560, 2048)]
     assert sheet.size == (5120, 4096)
+
+
+AREA = AreaLight("area", np.float32([0, 0, 2]), np.float32([0.3, 0, 0]), np.float32([0, 0.2, 0]), np.float32([0, 0, -1]),
+                 np.float32([4, 5, 6]))
+SPOT = SpotLight("spot", np.float32([-1, 0, 1.5]), np.float32([0.3, 0, -1]) / np.float32(1.0440307), np.float32([5, 5, 5]),
+                 cone_angle=1.0, blend=0.2)
+
+
+@pytest.mark.parametrize("lights", [(build.point_light((0.4, 0.2, -0.3), (1, 2, 3)),), (SUN,), (AREA,), (SPOT, SUN)],
+                         ids=["point", "sun", "area", "spot and sun"])
+def test_moved_lamps_are_captured_on_the_gpu(indirect, lights):
+    from rtgi_addon.preview.indirect.base import irradiance
+    before = BOX if isinstance(lights[0], type(BOX.lights[0])) else lit_by(build.point_light((0.0, 0.0, 1.0)))
+    after = replace(before, lights=lights)
+    field = bake(before)
+    made = indirect.make_indirect(field, before, samples=2000)
+    assert made.follow(after) and made.error is None
+    points = points_in(0.9, 2000) + np.float32([0, 0, 0.0 if before is BOX else 0.95])
+    normals = directions(2000)
+    # All texels, of maps traced by rays: the samples' mean, but for noise and for texels on edges.
+    expected = bake(after, every_texel=True).irradiance(points, normals)
+    found = irradiance(made, points, normals)
+    assert found.mean(axis=0) == pytest.approx(expected.mean(axis=0), rel=2e-3)
+    assert np.sqrt(np.mean((found - expected) ** 2)) < 0.05 * expected.mean()
+
+
+def test_lamps_that_light_nothing_are_dark(indirect):
+    from rtgi_addon.preview.indirect.base import irradiance
+    scene = lit_by(build.point_light((0.0, 0.0, 1.0)))
+    made = indirect.make_indirect(bake(scene), scene)
+    points, normals = points_in(1.0, 100), directions(100)
+    # A sun along the plane, and no lamp at all.
+    for lights in ((), (replace(SUN, direction_world=np.float32([1.0, 0.0, 0.0])),)):
+        assert made.follow(replace(scene, lights=lights))
+        assert not irradiance(made, points, normals).any()
+
+
+def test_changed_geometry_is_said(indirect):
+    made = indirect.make_indirect(bake(BOX), BOX)
+    assert not made.follow(build.closed_box(half_size=2.0)) and "bake again" in made.error
+
+
+def test_grids_with_shadow_rays_follow_on_a_worker(indirect):
+    field = bake(BOX, visibility=True, resolution=32, samples=64)
+    moved = replace(BOX, lights=(build.point_light((-0.4, 0.2, 0.1)),))
+    made = indirect.make_indirect(field, BOX)
+    assert made.follow(moved) and waited(made)
+    made.close()

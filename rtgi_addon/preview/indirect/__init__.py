@@ -24,9 +24,9 @@ def make_indirect(field: Field | None, scene: Scene, *, samples: int | None = No
     from ...techniques.vpl.field import VplField
     from ..indirect_pass import WorldLight
     from .live_lpv import LpvLight
+    from .live_rsm import rsm_light
     from .probes import probe_tables
     from .relighting import RelitLight
-    from .rsm import rsm_tables
     from .vpl import vpl_tables
     if field is None:
         return WorldLight(scene)
@@ -36,9 +36,8 @@ def make_indirect(field: Field | None, scene: Scene, *, samples: int | None = No
         return LpvLight(field)
     if isinstance(field, VplField):
         return RelitLight(field, partial(vpl_tables, samples=samples))
-    # Shadow rays are not for a shader: the grids have seen them.
-    if isinstance(field, RsmField) and not field.capture.settings.visibility:
-        return RelitLight(field, partial(rsm_tables, samples=samples))
+    if isinstance(field, RsmField):
+        return rsm_light(field, samples)
     return RelitLight(field, grid_tables)
 
 

@@ -1,5 +1,7 @@
 """Tables of reflective shadow maps for include/irradiance_rsm.glsl, the twin of techniques/rsm/gather.py, ``gather``."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...numerics.sampling import hash_u32
@@ -31,8 +33,7 @@ class Sheet:
 
 def rsm_tables(field: RsmField, samples: int | None = None) -> Tables:
     """The maps of ``field``, sampled as it does, or with ``samples`` texels a lamp."""
-    pattern = field.pattern if samples is None else Pattern(samples, field.pattern.disk_radius, field.pattern.disk_share,
-                                                            field.pattern.seed)
+    pattern = pattern_of(field, samples)
     maps = prepare(field.maps, pattern.samples)
     sheet = Sheet([item.view.resolution for item in maps])
     width, height = sheet.size
@@ -44,7 +45,17 @@ def rsm_tables(field: RsmField, samples: int | None = None) -> Tables:
     parts = [item.places(pattern) for item in maps]
     return Tables("indirect_rsm", STRUCT, rsm_values(len(maps), pattern),
                   {"texels": texels, "cumulative": cumulative, "maps": map_rows([item.view for item in maps], sheet, parts),
-                   "pattern": fold(np.concatenate([np.zeros((0, 2), np.float32), *(part for pair in parts for part in pair)]))})
+                   "pattern": pattern_rows(parts)})
+
+
+def pattern_of(field: RsmField, samples: int | None) -> Pattern:
+    """How ``field`` chooses texels, with another number of ``samples`` if one is given."""
+    return field.pattern if samples is None else replace(field.pattern, samples=samples)
+
+
+def pattern_rows(parts: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+    """Texels of all maps' points (``GatherMap.places``), one map after the other."""
+    return fold(np.concatenate([np.zeros((0, 2), np.float32), *(points for part in parts for points in part)]))
 
 
 def rsm_values(count: int, pattern: Pattern) -> dict:

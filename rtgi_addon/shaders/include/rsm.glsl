@@ -124,7 +124,8 @@ vec3 contribution(RsmMap map, Sample chosen, vec2 centre, vec3 position, vec3 no
 vec3 rsm_irradiance(RsmMap map, vec2 centre, vec2 shift, vec3 position, vec3 normal)
 {
   vec3 sum = vec3(0.0);
-  int samples = map.in_disk + map.by_flux;
+  // A map in which nothing is lit has no flux to follow.
+  int samples = running_sum(map, map.size - 1, map.size - 1) > 0u ? map.in_disk + map.by_flux : 0;
   for (int i = 0; i < samples; i++) {
     vec2 xi = list_texel(pattern, map.first_sample + i, 1, 0).xy + shift;
     xi -= floor(xi);

@@ -10,7 +10,7 @@ from ...progress import Progress
 from ...scene import Scene
 from ...transport.context import LightContext
 from ...transport.reflective_shadow_map import ReflectiveShadowMap
-from ...transport.shadow_views import texel_power, views_of
+from ...transport.shadow_views import ShadowView, texel_power, views_of
 from ..base import Field, ProbeGrid, volumes_by_settings
 from ..kernels import NUMPY, Kernels
 from ..resample import MAX_QUADRATURE_ORDER, resample
@@ -89,10 +89,15 @@ class Capture:
             grids |= {id(grid.volume): grid for grid in made}
         return RsmField(self, maps[self.settings], tuple(grids[id(volume)] for volume in self.context.scene.volumes))
 
-    def _capture(self, settings: RsmSettings, progress: Progress) -> tuple[ReflectiveShadowMap, ...]:
-        lights = self.context.scene.lights
+    def views(self, settings: RsmSettings) -> list[tuple[ShadowView, ...]]:
+        """Each lamp's views; all maps of a lamp together have the texels of one square."""
         views = [views_of(self.context, lamp, settings.resolution, focus=self._focus(settings.focus),
-                          area_points=settings.area_points) for lamp in range(len(lights))]
+                          area_points=settings.area_points) for lamp in range(len(self.context.scene.lights))]
+        sides = [max(4, round(settings.resolution / max(len(own), 1) ** 0.5)) for own in views]
+        return [tuple(replace(view, resolution=side) for view in own) for own, side in zip(views, sides, strict=True)]
+
+    def _capture(self, settings: RsmSettings, progress: Progress) -> tuple[ReflectiveShadowMap, ...]:
+        lights, views = self.context.scene.lights, self.views(settings)
         able = sum(1 for own in views if own)
         if able == 0:
             raise BakeError("the scene has no lamp with any power to capture a reflective shadow map from",
@@ -104,9 +109,7 @@ class Capture:
         maps = []
         for lamp, own in enumerate(views):
             progress.step(lamp / len(views), "capturing reflective shadow maps")
-            # All maps of a lamp together have the texels of one square.
-            side = max(4, round(settings.resolution / max(len(own), 1) ** 0.5))
-            maps += [self.kernels.capture(self.context, replace(view, resolution=side)) for view in own]
+            maps += [self.kernels.capture(self.context, view) for view in own]
         if not any(_reaches(lights[item.view.lamp], item) for item in maps):
             names = ", ".join(repr(light.name) for light in lights)
             raise BakeError(f"no surface is lit by {names}", "move the lamps to where they light something, or turn them to it")

@@ -78,12 +78,8 @@ class GatherMap:
         return self.rows[np.any(self.rows[:, 6:9] > 0, axis=1)]
 
     def places(self, pattern: Pattern) -> tuple[np.ndarray, np.ndarray]:
-        """The pattern's points (s, 2) float32 in [0, 1)² before they are turned: for the disk, and for what follows the flux.
-
-        A lamp's maps take turns with one sequence, so that maps that see the same do not read the same texels.
-        """
-        in_disk = round(self.samples * pattern.disk_share)
-        return r2(in_disk, pattern.seed, self._first), r2(self.samples - in_disk, pattern.seed + 1, self._first)
+        """This map's points of the pattern (see ``places``)."""
+        return places(pattern, self.samples, self._first)
 
     def centres(self, points: np.ndarray) -> np.ndarray:
         """Where receivers (n, 3) project into the unit square (n, 2) float32: the nearest point of it for those outside."""
@@ -115,14 +111,32 @@ class GatherMap:
         return head_on / np.maximum(cosine, 1.0 / MAX_SLANT)
 
 
+def places(pattern: Pattern, samples: int, first: int) -> tuple[np.ndarray, np.ndarray]:
+    """A map's points (s, 2) float32 of the pattern in [0, 1)² before they are turned: for the disk, and for what follows the flux.
+
+    A lamp's maps take turns with one sequence, so that maps that see the same do not read the same texels: ``first`` is how many
+    the others before it have taken.
+    """
+    in_disk = round(samples * pattern.disk_share)
+    return r2(in_disk, pattern.seed, first), r2(samples - in_disk, pattern.seed + 1, first)
+
+
+def shared_samples(strength: np.ndarray, lamp: np.ndarray, samples: int) -> tuple[list[int], list[int]]:
+    """How many of each lamp's ``samples`` its maps of ``strength`` (n,), indexed by ``lamp`` (n,), take, and how many those before
+    them have taken."""
+    if not len(strength):
+        return [], []
+    share = 0.5 / np.maximum(np.bincount(lamp)[lamp], 1) + 0.5 * strength / np.bincount(lamp, strength)[lamp]
+    counts = [max(MIN_SAMPLES, round(samples * part)) for part in share]
+    before = [sum(count for other, count in zip(lamp[:i], counts, strict=False) if other == lamp[i]) for i in range(len(counts))]
+    return counts, before
+
+
 def prepare(maps: tuple[ReflectiveShadowMap, ...], samples: int) -> tuple[GatherMap, ...]:
     """Maps ready to be gathered from, each with its part of the ``samples`` of its lamp. Those without flux are left out."""
     strength = np.array([float(luminance(item.total_flux)) for item in maps])
     maps, strength = [item for item, flux in zip(maps, strength, strict=True) if flux > 0], strength[strength > 0]
-    lamp = np.array([item.view.lamp for item in maps], np.intp)
-    share = 0.5 / np.maximum(np.bincount(lamp)[lamp], 1) + 0.5 * strength / np.bincount(lamp, strength)[lamp] if maps else ()
-    counts = [max(MIN_SAMPLES, round(samples * part)) for part in share]
-    before = [sum(count for other, count in zip(lamp[:i], counts, strict=False) if other == lamp[i]) for i in range(len(maps))]
+    counts, before = shared_samples(strength, np.array([item.view.lamp for item in maps], np.intp), samples)
     return tuple(GatherMap(*each) for each in zip(maps, counts, before, strict=True))
 
 

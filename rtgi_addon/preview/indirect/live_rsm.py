@@ -1,0 +1,83 @@
+"""Reflective shadow maps in the preview: when a lamp moves they are drawn and made ready to be sampled on the GPU."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...errors import BakeError
+from ...scene import Scene
+from ...techniques.kernels import NUMPY
+from ...techniques.rsm.field import RsmField
+from ...techniques.rsm.gather import MAX_SLANT, places, shared_samples
+from ...transport.shadow_views import texel_power
+from ...transport.vectors import luminance
+from ..capture import CapturedTextures, draw_capture
+from ..device import dispatch, uniform_buffer
+from ..programs import RSM_QUANTIZE, RSM_STORE, RSM_SUM_ROWS
+from ..textures import empty, upload
+from .base import FieldLight
+from .relighting import RelitLight
+from .rsm import STRUCT, Sheet, map_rows, pattern_of, pattern_rows, rsm_tables, rsm_values
+from .tables import UNIFORMS
+
+
+def rsm_light(field: RsmField, samples: int | None) -> FieldLight:
+    """The irradiance function of ``field``. One whose every sample has a shadow ray is read from its probe grids instead: a shader
+    has no rays."""
+    if not field.capture.settings.visibility:
+        return RsmLight(field, samples)
+    from . import grid_tables
+
+    def relight(scene, progress):
+        # A worker's kernels are numpy's: Blender's GPU works on the main thread only.
+        return replace(field.capture, context=field.capture.context.relit(scene), kernels=NUMPY).field(progress)
+
+    return RelitLight(field, grid_tables, relight)
+
+
+class RsmLight(FieldLight):
+    """The maps of ``field``, and then those of the scenes that are followed, with ``samples`` texels a lamp (None: the field's)."""
+
+    def __init__(self, field: RsmField, samples: int | None = None):
+        super().__init__(rsm_tables(field, samples), field.includes_direct)
+        self._capture, self._pattern = field.capture, pattern_of(field, samples)
+
+    def follow(self, scene: Scene) -> bool:
+        """See FieldLight."""
+        try:
+            capture = replace(self._capture, context=self._capture.context.relit(scene))
+        except BakeError as error:
+            self.error = str(error)
+            return False
+        views = [view for own in capture.views(capture.settings) for view in own]
+        # By what the lamp sends through each map: what that meets is known to the GPU only.
+        strength = np.array([float(luminance(texel_power(scene.lights[view.lamp], view).sum(axis=(0, 1), dtype=np.float64)))
+                             for view in views])
+        views, strength = [view for view, power in zip(views, strength, strict=True) if power > 0], strength[strength > 0]
+        counts, before = shared_samples(strength, np.array([view.lamp for view in views], np.intp), self._pattern.samples)
+        parts = [places(self._pattern, count, first) for count, first in zip(counts, before, strict=True)]
+        sheet = Sheet([view.resolution for view in views])
+        texels, cumulative = empty(3 * sheet.size[0], sheet.size[1]), empty(*sheet.size, "R32F")
+        for view, place in zip(views, sheet.places, strict=True):
+            _store(draw_capture(capture.context, view), place, texels, cumulative)
+        self.samplers = {"texels": texels, "cumulative": cumulative, "maps": upload(map_rows(views, sheet, parts)),
+                         "pattern": upload(pattern_rows(parts))}
+        self.uniforms = {UNIFORMS: uniform_buffer(STRUCT, rsm_values(len(views), self._pattern))}
+        self.error = None
+        return True
+
+
+def _store(drawn: CapturedTextures, place: tuple[int, int], texels, cumulative) -> None:
+    """A captured map into its place on the sheet."""
+    size, view = drawn.view.resolution, drawn.view
+    rows, quantized_rows, running = empty(size, 1), empty(size, 1), empty(size, size, "R32F")
+    flux = {"map_flux": drawn.flux}
+    dispatch(RSM_SUM_ROWS, (size, 1), samplers=flux, images={"rows": rows})
+    dispatch(RSM_QUANTIZE, (size, 1), samplers={**flux, "rows": rows},
+             images={"quantized_rows": quantized_rows, "running": running})
+    dispatch(RSM_STORE, (size, 1), uniforms={"parameters": {
+        "eye": view.position_world, "orthographic": int(view.orthographic), "forward": -view.world_from_view[:3, 2],
+        "max_slant": MAX_SLANT, "place": place}},
+        samplers={**flux, "map_position": drawn.position, "map_normal": drawn.normal, "map_power": drawn.power,
+                  "quantized_rows": quantized_rows, "running": running},
+        images={"texels": texels, "cumulative": cumulative})

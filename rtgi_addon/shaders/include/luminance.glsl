@@ -1,0 +1,5 @@
+// Luminance of linear Rec. 709 (transport/vectors.py).
+float luminance(vec3 color)
+{
+  return dot(color, vec3(0.2126, 0.7152, 0.0722));
+}
