@@ -89,17 +89,19 @@ def closed_components(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _parts(triangles: np.ndarray, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
-    """``closed_components`` of ``triangles`` (t, 3) as their indices tell it."""
+    """``closed_components`` of ``triangles`` (t, 3) as their indices tell it; those that name a vertex twice neither open nor close."""
     label = _connected(triangles, vertex_count)
+    of_row = np.flatnonzero(np.all(triangles != np.roll(triangles, -1, axis=1), axis=1))
+    triangles = triangles[of_row]
     start, end = triangles.reshape(-1), np.roll(triangles, -1, axis=1).reshape(-1)
     low, high = np.minimum(start, end), np.maximum(start, end)
     order = np.argsort(low * (vertex_count + 1) + high, kind="stable")
     low, high, direction = low[order], high[order], np.where(start < end, 1, -1)[order]
     first = np.flatnonzero(np.append(True, (low[1:] != low[:-1]) | (high[1:] != high[:-1])))
     count = np.diff(np.append(first, len(low)))
-    good = (count == 2) & (np.add.reduceat(direction, first) == 0) & (low[first] != high[first])
+    good = (count == 2) & (np.add.reduceat(direction, first) == 0)
     closed = np.ones(int(label.max(initial=-1)) + 1, bool)
-    closed[label[order[first[~good]] // 3]] = False
+    closed[label[of_row[order[first[~good]] // 3]]] = False
     return label, closed
 
 

@@ -1,6 +1,12 @@
-"""Where probes really stand: validity at the lattice points, and a small move out of geometry for those just inside."""
+"""Where probes really stand: validity at the lattice points, and a small move for those that lie just inside geometry or on it.
+
+A probe in the very plane of a wall sees that wall in every direction and nothing else, and one a hair behind it is dark: lattices
+drawn to fit a room have whole layers of them. Like RTXGI-DDGI's relocation this keeps probes a clearance away from surfaces; they
+go to the side that the nearest one faces.
+"""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,8 +23,12 @@ from ..base import BACKFACE_THRESHOLD
 PILOT_RAYS = 48
 # RTXGI-DDGI moves a probe by at most this share of a cell.
 MAX_OFFSET = 0.45
-# A moved probe stops this share of a cell beyond the surface it left.
+# A moved probe stops this share of a cell beyond the surface it left, and none stays nearer to a surface than that.
 CLEARANCE = 0.05
+# Surfaces meet in corners: a probe is moved away from this many, one after the other.
+MOST_WALLS = 3
+# Surfaces count as near up to this many clearances along a ray: any plane nearer than one is met by a pilot ray that soon.
+NEAR_ALONG_RAY = 2.0
 
 
 @dataclass(eq=False)
@@ -49,21 +59,71 @@ def place(context: LightContext, volumes: tuple[ProbeVolume, ...], virtual_offse
     lattice = np.concatenate(points).astype(np.float32)
     step = np.concatenate(step).astype(np.float32)
     solids = Solids(context.scene, context.geometry, context.surfaces)
-    validity, exit_direction, exit_distance = _pilot(context, solids, lattice, progress)
+    pilot = _pilot(context, solids, lattice, progress)
     offset = np.zeros_like(lattice)
-    inside = validity < 1.0 - BACKFACE_THRESHOLD
+    inside = pilot.validity < 1.0 - BACKFACE_THRESHOLD
     measured = ~inside
-    if virtual_offset and inside.any():
-        rows = np.flatnonzero(inside & (exit_distance + CLEARANCE * step <= MAX_OFFSET * step))
-        move = exit_direction[rows] * (exit_distance[rows] + CLEARANCE * step[rows])[:, None]
-        moved_validity, _, _ = _pilot(context, solids, lattice[rows] + move, progress)
-        rows, move = rows[moved_validity >= 1.0 - BACKFACE_THRESHOLD], move[moved_validity >= 1.0 - BACKFACE_THRESHOLD]
-        offset[rows], measured[rows] = move, True
-    return Placement(lattice + offset, offset, validity, measured, np.concatenate(reach).astype(np.float32))
+    if virtual_offset:
+        _leave_solids(context, solids, lattice, step, pilot, offset, measured, progress)
+        _leave_surfaces(context, lattice, step, offset, measured, progress)
+    return Placement(lattice + offset, offset, pilot.validity, measured, np.concatenate(reach).astype(np.float32))
 
 
-def _pilot(context, solids, points, progress):
-    """Validity (n,), and direction and distance to the nearest back face of a solid (infinite where there is none)."""
+class _Pilot(NamedTuple):
+    """Validity (n,), and direction (n, 3) and distance (n,) to the nearest back face of a solid (infinite where there is none)."""
+
+    validity: np.ndarray
+    exit_direction: np.ndarray
+    exit_distance: np.ndarray
+
+
+def _leave_solids(context, solids, lattice, step, pilot, offset, measured, progress) -> None:
+    """Move probes that are less than MAX_OFFSET of a cell inside a solid out of it; sets their ``offset`` and ``measured``."""
+    rows = np.flatnonzero(~measured & (pilot.exit_distance + CLEARANCE * step <= MAX_OFFSET * step))
+    move = pilot.exit_direction[rows] * (pilot.exit_distance[rows] + CLEARANCE * step[rows])[:, None]
+    good = _pilot(context, solids, lattice[rows] + move, progress).validity >= 1.0 - BACKFACE_THRESHOLD
+    offset[rows[good]], measured[rows[good]] = move[good], True
+
+
+def _leave_surfaces(context, lattice, step, offset, measured, progress) -> None:
+    """Move measured probes nearer than CLEARANCE to a surface away from it, to the side that it faces; changes their ``offset``."""
+    rows = np.flatnonzero(measured)
+    for _ in range(MOST_WALLS):
+        normal, height = _nearest_surface(context, lattice[rows] + offset[rows], CLEARANCE * step[rows], progress)
+        # Rounding must not leave a probe that was moved nearer than the clearance.
+        near = np.flatnonzero(height < 0.99 * CLEARANCE * step[rows])
+        rows, normal, height = rows[near], normal[near], height[near]
+        offset[rows] += normal * (CLEARANCE * step[rows] - height)[:, None]
+
+
+def _nearest_surface(context, points, clearance, progress):
+    """Normal (n, 3) and signed height (n,) above its plane of the nearest surface around each of ``points`` (n, 3), of those met
+    within NEAR_ALONG_RAY times ``clearance`` (n,); infinite where there is none."""
+    directions = fibonacci_sphere(PILOT_RAYS)
+    spans = chunks(len(points), CHUNK // PILOT_RAYS)
+
+    def trace(i):
+        n = len(points[spans[i]])
+        rays, limit = np.repeat(directions, n, axis=0), np.tile(NEAR_ALONG_RAY * clearance[spans[i]], PILOT_RAYS)
+        hits = context.tracer.intersect(np.tile(points[spans[i]], (PILOT_RAYS, 1)), rays, limit)
+        rows = np.flatnonzero(hits.primitive >= 0)
+        normals = context.geometry.normals_world[hits.primitive[rows]]
+        height = np.full(PILOT_RAYS * n, np.inf, np.float32)
+        height[rows] = -dot(normals, rays[rows]) * hits.t[rows]
+        height = height.reshape(PILOT_RAYS, n)
+        nearest = np.abs(height).argmin(axis=0)
+        of_ray = np.zeros((PILOT_RAYS * n, 3), np.float32)
+        of_ray[rows] = normals
+        return of_ray.reshape(PILOT_RAYS, n, 3)[nearest, np.arange(n)], height[nearest, np.arange(n)]
+
+    parts = parallel_for(trace, len(spans), context.threads, progress, "placing probes")
+    normal, height = np.zeros((len(points), 3), np.float32), np.full(len(points), np.inf, np.float32)
+    for span, (own_normal, own_height) in zip(spans, parts, strict=True):
+        normal[span], height[span] = own_normal, own_height
+    return normal, height
+
+
+def _pilot(context, solids, points, progress) -> _Pilot:
     directions = fibonacci_sphere(PILOT_RAYS)
     spans = chunks(len(points), CHUNK // PILOT_RAYS)
 
@@ -89,4 +149,4 @@ def _pilot(context, solids, points, progress):
         nearest = t_solid.argmin(axis=0)
         distance[span] = t_solid[nearest, np.arange(n)]
         direction[span] = directions[nearest]
-    return validity, direction, distance
+    return _Pilot(validity, direction, distance)
