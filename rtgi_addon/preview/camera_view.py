@@ -5,7 +5,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..scene import Camera
-from .surfaces import View
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """Where from and how the scene is drawn: ``clip_from_world`` (4, 4), ``world_from_view`` (4, 4) looking along −Z. ``seed`` is
+    that of the coins which decide about coverage without a threshold."""
+
+    clip_from_world: np.ndarray
+    world_from_view: np.ndarray
+    far: float
+    orthographic: bool
+    seed: int = 0
+
+    @property
+    def uniforms(self) -> dict:
+        """Values of the struct VIEW."""
+        return {"clip_from_world": self.clip_from_world, "position_world": self.world_from_view[:3, 3], "far": self.far,
+                "forward_world": -self.world_from_view[:3, 2], "orthographic": int(self.orthographic),
+                "seed": self.seed}
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,8 @@ from .lamp_choice import choose_lamps, lamp_chances
 from .lamp_sample import LampSample, sample_lamp
 from .programs import DIRECT_LIGHT, OUTPUTS
 from .settings import PreviewSettings
-from .shadow_maps import ShadowMap, shadow_parts
+from .shadow_maps import ShadowMap
+from .shadow_parts import shadow_parts
 from .surfaces import SurfacePass
 from .textures import upload
 

@@ -3,10 +3,11 @@
 import gpu
 
 from ..scene import Scene
+from .camera_view import View
 from .device import RenderTarget
 from .materials import Images
 from .programs import OUTPUTS
-from .surfaces import SurfacePass, View
+from .surfaces import SurfacePass
 
 
 class GBuffer:
