@@ -67,6 +67,8 @@ class DirectLight:
                 for index, gain in choose_lamps(self._chances, choice)]
 
     def _view_count(self, light: Light, bounds: np.ndarray) -> int:
+        if not light.casts_shadow:
+            return 1
         if isinstance(light, SunLight):
             return self._settings.shadow_cascades
-        return max(len(sample_lamp(light, np.full(3, 0.5)).shadow_views(bounds, self._shadow_map.resolution)), 1)
+        return len(sample_lamp(light, np.full(3, 0.5)).shadow_views(bounds, self._shadow_map.resolution))
