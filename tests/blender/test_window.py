@@ -8,9 +8,7 @@
 
 import json
 import os
-import shlex
 import shutil
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -20,21 +18,6 @@ ADDON = "bl_ext.user_default.rtgi_addon"
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif("RTGI_BLENDER" not in os.environ,
                                                    reason="RTGI_BLENDER names no Blender that can open a window")]
-
-
-@pytest.fixture(scope="module")
-def blender(tmp_path_factory):
-    """Start that Blender with ``arguments`` and this repository installed as an extension; returns the finished process."""
-    user = tmp_path_factory.mktemp("user")
-    (user / "extensions/user_default").mkdir(parents=True)
-    (user / "extensions/user_default/rtgi_addon").symlink_to(REPOSITORY)
-
-    def start(*arguments):
-        command = [*shlex.split(os.environ["RTGI_BLENDER"]), "--factory-startup", "--addons", ADDON, *map(str, arguments)]
-        environment = {**os.environ, "BLENDER_USER_RESOURCES": str(user)}
-        return subprocess.run(command, cwd=REPOSITORY, env=environment, capture_output=True, text=True, timeout=900, check=False)
-
-    return start
 
 
 @pytest.fixture(scope="module")

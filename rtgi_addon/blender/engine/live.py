@@ -5,6 +5,7 @@ timer: reading a world or a material can take Blender operators, which are not a
 """
 
 import time
+import traceback
 from dataclasses import replace
 
 import bpy
@@ -57,6 +58,10 @@ class LiveScene:
             refreshed = refresh_scene(self.scene, depsgraph)
             self.wants_all = refreshed is None
             self.scene = refreshed or self.scene
+        self.ask()
+
+    def ask(self) -> None:
+        """Have what is pending read soon."""
         if self.pending:
             _serve_in(min(_REST * self._seconds, _LONGEST))
 
@@ -71,6 +76,9 @@ class LiveScene:
             self.error = ""
         except BakeError as error:
             self.error = str(error)
+        except Exception as error:
+            traceback.print_exc()
+            self.error = f"The scene cannot be read, {type(error).__name__}: {error} (details in the console)"
         finally:
             self.wants_all = self.wants_world = False
             self._seconds = time.monotonic() - started

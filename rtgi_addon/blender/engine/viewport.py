@@ -48,6 +48,7 @@ class Viewport:
         live, scene = live_scene(depsgraph), depsgraph.scene.original
         shown = shown_for(scene)
         if live.scene is None:
+            live.ask()
             engine.update_stats("RTGI", live.error or "Reading the scene")
             return
         if not self._broken:
