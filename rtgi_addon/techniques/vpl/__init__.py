@@ -55,7 +55,7 @@ class VirtualPointLights(Technique):
         progress.stage("virtual lights")
         lights = sample_lights(context, scene.volumes, settings, seed, focus(scene.volumes), progress.span(0.02, 0.2))
         natural = mean_bound(context, lights)
-        clamp = natural if settings.clamp is None else settings.clamp or None
+        clamp = _own_bound(natural, settings) if settings.clamp is None else settings.clamp or None
         field = VplField(context, lights, settings, seed, clamp, natural, kernels=kernels)
         require_lights(field)
         if clamp is not None:
@@ -69,6 +69,15 @@ class VirtualPointLights(Technique):
     def sweep(self) -> tuple[VplSettings, ...]:
         """Numbers of virtual lights, to which time is proportional."""
         return (VplSettings(lights=64), VplSettings(lights=256), VplSettings(lights=1024), VplSettings())
+
+
+# What compensation gives back need not come as a bright spot: with it, no light gives a receiver more than this share of the mean
+# irradiance. Where no ray finds again what is cut, the bound stays at the mean itself and costs less light.
+COMPENSATED_SHARE = 0.1
+
+
+def _own_bound(natural: float | None, settings: VplSettings) -> float | None:
+    return natural if natural is None or not settings.compensation else COMPENSATED_SHARE * natural
 
 
 def mean_bound(context: LightContext, lights: LightSet) -> float | None:

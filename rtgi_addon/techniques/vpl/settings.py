@@ -16,7 +16,8 @@ class VplSettings:
                                   0, 1000)
     direct: bool = setting(False, "Include Lamps", "Add the direct light of lamps, which engines usually add themselves")
     clamp: float | None = setting(None, "Clamp", "Bound of a virtual light's geometry term, against bright spots near surfaces; "
-                                  "unset lets no light give more than the mean irradiance, 0 has no bound", "1/m²", 0, 1e9)
+                                  "unset lets no light give more than the mean irradiance, or a tenth of it with compensation; "
+                                  "0 has no bound", "1/m²", 0, 1e9)
     compensation: bool = setting(True, "Compensation", "Give back by short rays what the clamp takes away from corners")
     compensation_rays: int = setting(64, "Compensation Rays", "Short rays per receiver", "", 1, 4096)
     candidates: int = setting(16, "Candidates", "Virtual lights tried for each that is kept: of more, those that light the volumes "
