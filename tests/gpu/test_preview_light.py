@@ -30,7 +30,8 @@ LAMPS = {
                          "ELLIPSE"),
     "spread": AreaLight("area", np.float32([-0.8, 0, 2.2]), np.float32([0.3, 0, 0]), np.float32([0, 0.3, 0]), DOWN, COLOR,
                         spread=2.0),
-    "beam": AreaLight("area", np.float32([-0.3, 0, 2.2]), np.float32([0.7, 0, 0]), np.float32([0, 0.6, 0]), DOWN, COLOR, spread=0.0),
+    "beam": AreaLight("area", np.float32([-0.3, 0, 2.2]), np.float32([0.7, 0, 0]), np.float32([0, 0.6, 0]), DOWN, COLOR,
+                      spread=0.0),
 }
 
 
