@@ -22,4 +22,7 @@ class UsageError(BakeError):
 
 
 class Cancelled(Exception):
-    """Raised by ``Progress.step`` once the user has asked to stop. Never an error: the last bake stays whole."""
+    """Raised by ``Progress.step`` once the user has asked to stop. Never an error: the last bake stays whole.
+
+    A message says what was kept of the work so far, where anything was.
+    """

@@ -126,7 +126,7 @@ def render_probes(points_world, settings: CyclesSettings | None = None, scene: b
     if method == "auto":
         method = "tiles" if bpy.app.build_options.cycles_osl else "panorama"
     prepare, render = (_camera_tiles, _render_tiles) if method == "tiles" else (_camera_panorama, _render_panoramas)
-    with _rendering(scene, settings) as camera, tempfile.TemporaryDirectory() as name:
+    with rendering(scene, settings) as camera, tempfile.TemporaryDirectory() as name:
         folder, started = Path(name), time.perf_counter()
         weights = prepare(camera, scene, points, settings, folder)
         total = np.zeros((len(points), sh.coefficient_count(settings.order), 3))
@@ -169,16 +169,26 @@ def _camera_tiles(camera, scene, points, settings, folder) -> np.ndarray:
     source = CAMERA_SHADER.format(
         floats=3 * count, probes=count, columns=columns, rows=rows, quarter_pi=repr(np.pi / 4),
         origins=", ".join(repr(float(value)) for value in points.astype(np.float32).ravel()))
-    (folder / "probes.osl").write_text(source)
+    set_camera(camera, compile_camera(source, folder))
+    return _pixel_weights(resolution, settings.order)
+
+
+def compile_camera(source: str, folder: Path) -> str:
+    """The bytecode of the OSL camera ``source``, by way of files in ``folder``. Raises BakeError."""
+    (folder / "camera.osl").write_text(source)
     # Blender's own way from a text to a camera needs a module (oslquery) that bpy from PyPI lacks; the compiler is there.
     import _cycles
-    if not _cycles.osl_compile(str(folder / "probes.osl"), str(folder / "probes.oso")):
-        raise BakeError("Cycles could not compile the camera that starts rays at the probes", "use method='panorama'")
-    bytecode = (folder / "probes.oso").read_text()
+    if not _cycles.osl_compile(str(folder / "camera.osl"), str(folder / "camera.oso")):
+        raise BakeError("Cycles could not compile the camera that starts rays where they are wanted",
+                        "use method='panorama', or the path reference")
+    return (folder / "camera.oso").read_text()
+
+
+def set_camera(camera: bpy.types.Object, bytecode: str) -> None:
+    """Let ``camera`` start its rays as the compiled OSL says."""
     camera.data.type, camera.data.custom_mode = "CUSTOM", "INTERNAL"
     camera.data.custom_bytecode = bytecode
     camera.data.custom_bytecode_hash = hashlib.md5(bytecode.encode(), usedforsecurity=False).hexdigest()
-    return _pixel_weights(resolution, settings.order)
 
 
 def _pixel_weights(resolution: int, order: int, sub: int = 8) -> np.ndarray:
@@ -193,7 +203,7 @@ def _pixel_weights(resolution: int, order: int, sub: int = 8) -> np.ndarray:
 def _render_tiles(scene, camera, points, settings, weights, folder) -> np.ndarray:
     """One render of every probe's tile, projected: (n, k, 3)."""
     resolution = settings.resolution
-    picture = _render(scene, folder)
+    picture = render_picture(scene, folder)
     rows, columns = picture.shape[0] // resolution, picture.shape[1] // resolution
     tiles = picture.reshape(rows, resolution, columns, resolution, 3).transpose(0, 2, 1, 3, 4)
     tiles = tiles.reshape(rows * columns, resolution**2, 3)[:len(points)]
@@ -231,11 +241,11 @@ def _render_panoramas(scene, camera, points, settings, weights, folder) -> np.nd
     result = np.empty((len(points), weights.shape[1], 3))
     for index, point in enumerate(points):
         camera.location = point
-        result[index] = weights.T @ _render(scene, folder).reshape(-1, 3)
+        result[index] = weights.T @ render_picture(scene, folder).reshape(-1, 3)
     return result
 
 
-def _render(scene, folder: Path) -> np.ndarray:
+def render_picture(scene, folder: Path) -> np.ndarray:
     """Render ``scene``; returns linear radiance (height, width, 3) float64, row 0 at the bottom.
 
     Python cannot read a Render Result's pixels in the background, so the picture goes through a float EXR.
@@ -258,7 +268,7 @@ def _render(scene, folder: Path) -> np.ndarray:
 
 
 @contextmanager
-def _rendering(scene: bpy.types.Scene, settings: CyclesSettings):
+def rendering(scene: bpy.types.Scene, settings: CyclesSettings):
     """Set ``scene`` up for unbiased renders through a camera of our own (yielded); put everything back at the end."""
     import addon_utils
     if not hasattr(scene, "cycles"):

@@ -5,7 +5,7 @@ compares. A planner that wants other receivers makes another yard, or passes ``r
 
 Each bake is held to the reference in several places, which separates the causes of error:
 
-- ``surface``: the technique's own field at all receivers, surface normals and tilted ones;
+- ``surface``: the technique's own field at all receivers: on surfaces under their normals, and just above under tilted ones;
 - ``own_normals``: of these only the receivers under the surface's own normal;
 - ``shipped``: the same receivers lit by the probes that the bundle holds, as an engine would be;
 - ``probes``: the SH of usable probes, where nothing is interpolated;
@@ -19,7 +19,7 @@ import numpy as np
 
 from ..errors import BakeError
 from ..numerics import sh
-from ..numerics.grid import lattice_points
+from ..numerics.grid import cell_size, lattice_points
 from ..progress import Progress
 from ..scene import Scene
 from ..techniques import Field, Technique
@@ -33,6 +33,8 @@ from .references import PathReference, Reference, Truth
 
 # Receivers with less than this share of the mean irradiance count as dark: what they get too much is leaked.
 DARK = 0.01
+# Receivers under other normals than the surface's stand this share of a lattice cell above it.
+LIFT = 0.2
 # Bands that probes are compared in, the most that any engine stores.
 PROBE_ORDER = 2
 PLACES = ("surface", "own_normals", "shipped", "probes", "known")
@@ -96,7 +98,8 @@ class Yard:
         lattice = np.concatenate([lattice_points(volume.world_from_local, volume.resolution).reshape(-1, 3)
                                   for volume in self.scene.volumes])
         self.receivers = receivers if receivers is not None else surface_receivers(
-            self.context, lattice[self.usable], points, normals_per_point, seed)
+            self.context, lattice[self.usable], points, normals_per_point, seed, LIFT * min(
+                cell_size(volume.world_from_local, volume.resolution).min() for volume in self.scene.volumes))
         if not len(self.receivers.points):
             raise BakeError("no surface can be seen from any probe", "move the Light Probe Volume to the geometry")
         chosen = np.random.default_rng([seed, 0x7072]).permutation(len(self.usable))[:probes]

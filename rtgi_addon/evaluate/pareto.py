@@ -27,9 +27,9 @@ def cheapest_within(costs, errors, target: float) -> int | None:
     return best_within(errors, costs, target)
 
 
-def round_steps(low: float, high: float) -> list[float]:
-    """1, 2 and 5 times powers of ten from the first at or above ``low`` to the first at or above ``high``; both positive."""
+def round_steps(low: float, high: float, factors: tuple[float, ...] = (1.0, 2.0, 5.0)) -> list[float]:
+    """``factors`` times powers of ten, from the first at or above ``low`` to the first at or above ``high``; both positive."""
     exponents = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
-    steps = [factor * 10.0**exponent for exponent in exponents for factor in (1.0, 2.0, 5.0)]
+    steps = [factor * 10.0**exponent for exponent in exponents for factor in factors]
     last = next(step for step in [*steps, np.inf] if step >= high * (1 - 1e-9))
     return [step for step in steps if low * (1 - 1e-9) <= step <= last]

@@ -1,4 +1,4 @@
-"""Where errors are measured: points on surfaces, under many normals, and probes.
+"""Where errors are measured: points on surfaces and just above them, under many normals, and probes.
 
 Errors at probes are those of the bake alone; errors at surface points have in them what interpolation between probes, leaks and
 self-lighting add (PHYSICS.md §4).
@@ -41,11 +41,13 @@ def open_probes(context: LightContext, volumes: tuple[ProbeVolume, ...]) -> np.n
     return np.flatnonzero(placement.validity >= 1.0 - BACKFACE_THRESHOLD)
 
 
-def surface_receivers(context: LightContext, eyes: np.ndarray, points: int, normals_per_point: int = 4, seed: int = 0) -> Receivers:
+def surface_receivers(context: LightContext, eyes: np.ndarray, points: int, normals_per_point: int = 4, seed: int = 0,
+                      lift: float = 0.0) -> Receivers:
     """``points`` points on surfaces that rays from ``eyes`` (p, 3) in the open meet, each under ``normals_per_point`` normals.
 
     The first normal of a point is its surface's own, towards the eye; the others are cosine-distributed about it, as those of
-    bumps and of small things that lie there. Fewer points where hardly any ray meets a surface. Another ``seed``
+    small things that stand there, ``lift`` [m] above the surface (but no more than half way to the next one): without it they
+    would look at their own surface from no distance at all. Fewer points where hardly any ray meets a surface. Another ``seed``
     gives independent points: what was chosen on some can be checked on others.
     """
     rng = np.random.default_rng([seed, 0x7265])
@@ -63,12 +65,15 @@ def surface_receivers(context: LightContext, eyes: np.ndarray, points: int, norm
         wanted -= len(rows)
         if wanted == 0:
             break
-    position, own = (np.concatenate(part) for part in zip(*found, strict=True))
-    tilted = _tilted(np.repeat(own, normals_per_point - 1, axis=0), rng)
-    normals = np.concatenate([own[:, None], tilted.reshape(len(own), normals_per_point - 1, 3)], axis=1)
-    first = np.arange(normals_per_point) == 0
-    return Receivers(np.repeat(position, normals_per_point, axis=0).astype(np.float32), normals.reshape(-1, 3).astype(np.float32),
-                     np.tile(first, len(own)))
+    position, own = (np.concatenate(part).astype(np.float32) for part in zip(*found, strict=True))
+    others = normals_per_point - 1
+    room = context.tracer.intersect(position, own).t
+    lifted = position + own * np.minimum(np.float32(lift), 0.5 * room)[:, None]
+    tilted = _tilted(np.repeat(own, others, axis=0), rng)
+    normals = np.concatenate([own[:, None], tilted.reshape(len(own), others, 3)], axis=1)
+    places = np.concatenate([position[:, None], np.repeat(lifted[:, None], others, axis=1)], axis=1)
+    return Receivers(places.reshape(-1, 3).astype(np.float32), normals.reshape(-1, 3).astype(np.float32),
+                     np.tile(np.arange(normals_per_point) == 0, len(own)))
 
 
 def _tilted(normals: np.ndarray, rng: np.random.Generator) -> np.ndarray:

@@ -108,7 +108,8 @@ def _run(argv: list[str], prog: str, open_scene: Callable[[Namespace], None], ch
         if arguments.traceback:
             traceback.print_exc(file=streams.err)
         if isinstance(error, (Cancelled, KeyboardInterrupt)):
-            streams.err.write("rtgi: cancelled\n")
+            kept = f": {error}" if isinstance(error, Cancelled) and str(error) else ""
+            streams.err.write(f"rtgi: cancelled{kept}\n")
             streams.err.flush()
             return CANCELLED
         _complain(streams.err, error)

@@ -3,9 +3,9 @@
 import argparse
 
 from ...errors import UsageError
-from . import bake, info, render
+from . import bake, chart, info, render
 
-SUBCOMMANDS = {entry.name: entry for entry in (bake.SUBCOMMAND, render.SUBCOMMAND, info.SUBCOMMAND)}
+SUBCOMMANDS = {entry.name: entry for entry in (bake.SUBCOMMAND, render.SUBCOMMAND, chart.SUBCOMMAND, info.SUBCOMMAND)}
 
 
 class _Parser(argparse.ArgumentParser):

@@ -1,0 +1,287 @@
+"""Charts in Blender: an operator that measures on a worker thread, the ranking as a table in the sidebar, the picture as an image.
+
+What was charted lives as long as this run of Blender, by scene name: its files are in the output folder, beside the bake.
+"""
+
+from pathlib import Path
+
+import bpy
+
+from ..errors import BakeError
+from ..evaluate.chart_data import Chart
+from ..progress import Progress
+from . import dependencies
+from .bake_job import output_folder
+from .extract import extract_scene
+from .panels import draw_lines
+from .session import redraw, session
+from .worker import BakeWorker, Report, duration
+
+_TICK, _GRACE = 0.1, 5.0
+# Rows of the table in the panel.
+_MOST_ROWS = 10
+
+
+class Charts:
+    """The chart under way and those that were made: ``worker`` with the scene it is for, the finished or latest partial ``Chart``
+    and the folder by scene name."""
+
+    def __init__(self):
+        self.worker: BakeWorker | None = None
+        self.charting = ""
+        self.folder: Path | None = None
+        self.charts: dict[str, tuple[Chart, Path]] = {}
+
+    @property
+    def running(self) -> bool:
+        """True while something is measured."""
+        return self.worker is not None and self.worker.running
+
+
+charts = Charts()
+
+
+class RTGI_OT_chart(bpy.types.Operator):
+    """Bake this scene with every technique at several settings and chart their errors against time, rays and memory"""
+
+    bl_idname = "rtgi.chart"
+    bl_label = "Chart Techniques"
+    bl_options = {"REGISTER"}
+
+    seeds: bpy.props.IntProperty(name="Seeds", description="Bakes of each setting, from which intervals follow", default=4, min=1,
+                                 max=32)
+    points: bpy.props.IntProperty(name="Surface Points", description="Points on surfaces where errors are measured", default=128,
+                                  min=8, max=4096)
+    noise: bpy.props.FloatProperty(name="Reference Noise", description="Relative noise at which the reference stops", default=0.01,
+                                   min=0.001, max=0.2, precision=3)
+    reference: bpy.props.EnumProperty(name="Reference", description="What is held to be right", items=[
+        ("path", "Path Tracer", "This add-on's own path tracer"),
+        ("cycles", "Cycles", "Cycles, on the CPU; Blender waits while it renders")])
+
+    @classmethod
+    def poll(cls, context):
+        """Not while another chart or a bake is running."""
+        if charts.running or session.running:
+            cls.poll_message_set("A chart or a bake is already running")
+            return False
+        return context.mode == "OBJECT"
+
+    def execute(self, context):
+        """Measure here and now: for scripts and for Blender without a window."""
+        worker = self._worker(context, on_report=lambda report: None)
+        if worker is None:
+            return {"CANCELLED"}
+        worker.run()
+        return self._finish()
+
+    def invoke(self, context, event):
+        """Measure on a thread while the window stays alive."""
+        if bpy.app.background:
+            return self.execute(context)
+        worker = self._worker(context)
+        if worker is None:
+            return {"CANCELLED"}
+        self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
+        context.window_manager.modal_handler_add(self)
+        worker.start()
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        """Show progress at every tick; stop on Esc; leave everything else to Blender."""
+        worker = charts.worker
+        if event.type == "ESC" and event.value == "PRESS":
+            worker.cancel()
+            redraw()
+            return {"RUNNING_MODAL"}
+        if event.type != "TIMER":
+            return {"PASS_THROUGH"}
+        if worker.poll():
+            self._show(context, worker.report)
+            return {"PASS_THROUGH"}
+        self._clean_up(context)
+        return self._finish()
+
+    def cancel(self, context):
+        """Blender ends the operator itself."""
+        if charts.worker is not None:
+            charts.worker.cancel()
+        self._clean_up(context)
+
+    def _worker(self, context, on_report=None) -> BakeWorker | None:
+        """The chart of this scene, ready to be measured; None once a reason against it was reported."""
+        scene = context.scene
+        try:
+            if charts.worker is not None and not charts.worker.join(_GRACE):
+                raise BakeError("the chart that was cancelled is still ending", "try again in a moment")
+            dependencies.require()
+            from ..jobs.chart import chart_scene  # needs OpenEXR, without which the add-on still registers
+            charts.folder = output_folder(scene.rtgi.output).with_name(output_folder(scene.rtgi.output).name + "_chart")
+            extracted = extract_scene(context=context)
+            reference = None
+            if self.reference == "cycles":
+                from .cycles_receivers import CyclesReference
+                reference = CyclesReference(self.noise, scene=scene)
+        except BakeError as error:
+            self.report({"ERROR"}, str(error))
+            return None
+        folder, name = charts.folder, scene.name
+        options = {"seeds": self.seeds, "points": self.points, "noise": self.noise, "reference": reference}
+
+        def measure(progress: Progress):
+            return chart_scene(extracted, folder, progress=progress, **options,
+                               on_point=lambda chart: charts.charts.__setitem__(name, (chart, folder)))
+
+        charts.worker, charts.charting = BakeWorker(measure, on_report), name
+        charts.charts.pop(name, None)
+        return charts.worker
+
+    def _finish(self):
+        outcome, name = charts.worker.outcome, charts.charting
+        charts.charting = ""
+        redraw()
+        if outcome.error:
+            self.report({"ERROR"}, outcome.error)
+            return {"CANCELLED"}
+        if outcome.cancelled:
+            kept = charts.charts.get(name)
+            self.report({"INFO"}, "Chart cancelled" + (f"; {len(kept[0].points)} settings are in {kept[1]}" if kept else ""))
+            if kept:
+                _load_image(kept[1] / "chart.png")
+            return {"CANCELLED"}
+        report = outcome.summary
+        charts.charts[name] = report.chart, report.folder
+        if report.picture is not None:
+            _load_image(report.picture)
+        self.report({"INFO"}, report.hint or f"Charted {len(report.chart.points)} settings into {report.folder}")
+        return {"FINISHED"}
+
+    def _show(self, context, report: Report) -> None:
+        stopping = charts.worker.progress.cancelled
+        context.workspace.status_text_set("RTGI: cancelling…" if stopping else f"RTGI: {report.text}  |  Esc to cancel")
+        redraw()
+
+    def _clean_up(self, context) -> None:
+        if self._timer is not None:
+            context.window_manager.event_timer_remove(self._timer)
+            self._timer = None
+        for workspace in bpy.data.workspaces:  # the user may have gone to another since
+            with context.temp_override(workspace=workspace):
+                workspace.status_text_set(None)
+
+    _timer = None
+
+
+class RTGI_OT_cancel_chart(bpy.types.Operator):
+    """Stop measuring. What was measured is kept"""
+
+    bl_idname = "rtgi.cancel_chart"
+    bl_label = "Cancel Chart"
+    bl_options = {"INTERNAL"}
+
+    @classmethod
+    def poll(cls, context):
+        """Only while there is something to stop."""
+        return charts.running
+
+    def execute(self, context):
+        """Ask the worker to stop at its next step."""
+        charts.worker.cancel()
+        redraw()
+        return {"FINISHED"}
+
+
+class RTGI_PT_chart(bpy.types.Panel):
+    """Which technique gives what for which time."""
+
+    bl_label = "Techniques Compared"
+    bl_parent_id = "RTGI_PT_bake"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "RTGI"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        """The button or its progress, and the settings ranked by error."""
+        layout, width = self.layout, context.region.width
+        if charts.running:
+            report, stopping = charts.worker.report, charts.worker.progress.cancelled
+            left = "" if report.seconds_left is None else f"  ·  {duration(report.seconds_left)} left"
+            row = layout.row(align=True)
+            row.progress(factor=report.fraction, type="BAR",
+                         text="Cancelling…" if stopping else f"{100 * report.fraction:.0f}%{left}")
+            row.operator("rtgi.cancel_chart", text="", icon="CANCEL")
+        else:
+            layout.operator("rtgi.chart", icon="GRAPH")
+        known = charts.charts.get(context.scene.name)
+        if known is None:
+            return
+        chart, folder = known
+        if not chart.complete and not charts.running:
+            draw_lines(layout, "Cancelled before the end", width, "INFO")
+        _draw_ranking(layout, chart)
+        draw_lines(layout, folder.name, width, "FILE_FOLDER")
+
+
+def ranking(chart: Chart) -> list[tuple[bool, str, str, str]]:
+    """The settings of ``chart`` from the least error: whether it is on the Pareto front, technique and setting, error, time."""
+    front = set(chart.front())
+    order = sorted(range(len(chart.points)), key=lambda index: chart.points[index].error())
+    rows = []
+    for index in order[:_MOST_ROWS]:
+        point = chart.points[index]
+        rows.append((index in front, f"{point.technique}, {point.label}", f"{100 * point.error():.2g}%",
+                     f"{point.seconds.mean:.2g} s" if point.seconds.mean < 10 else duration(point.seconds.mean)))
+    return rows
+
+
+def _draw_ranking(layout, chart: Chart) -> None:
+    column = layout.column(align=True)
+    for on_front, name, error, time in [(False, "Setting", "Error", "Time"), *ranking(chart)]:
+        row = column.split(factor=0.62)
+        row.label(text=name, icon="SOLO_ON" if on_front else "BLANK1")
+        cells = row.row()
+        cells.label(text=error)
+        cells.label(text=time)
+
+
+def _load_image(path: Path) -> None:
+    """The picture at ``path`` as the image of that name, replaced if an earlier chart is there."""
+    if not path.is_file():
+        return
+    image = bpy.data.images.get("RTGI Chart")
+    if image is None:
+        image = bpy.data.images.load(str(path))
+        image.name = "RTGI Chart"
+    else:
+        image.filepath = str(path)
+        image.reload()
+
+
+@bpy.app.handlers.persistent
+def forget_charts(*_):
+    """Another file is about to be opened: stop measuring, and drop what belongs to the old one's scenes."""
+    if charts.worker is not None:
+        charts.worker.cancel()
+    charts.charts.clear()
+
+
+_CLASSES = (RTGI_OT_chart, RTGI_OT_cancel_chart, RTGI_PT_chart)
+
+
+def register() -> None:
+    """Register operators, panel and handler."""
+    for cls in _CLASSES:
+        bpy.utils.register_class(cls)
+    bpy.app.handlers.load_pre.append(forget_charts)
+
+
+def unregister() -> None:
+    """Stop a running chart, give it a moment to end, and take everything out."""
+    if charts.worker is not None:
+        charts.worker.cancel()
+        charts.worker.join(_GRACE)
+        charts.worker = None
+    charts.charts.clear()
+    bpy.app.handlers.load_pre.remove(forget_charts)
+    for cls in reversed(_CLASSES):
+        bpy.utils.unregister_class(cls)

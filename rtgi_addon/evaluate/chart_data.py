@@ -1,0 +1,130 @@
+"""What a chart of speed against accuracy says, as data: one point for every setting of every technique, with figures over seeds."""
+
+from dataclasses import asdict, dataclass, fields
+
+from ..techniques import Technique
+from .measure import Run, Yard
+from .pareto import pareto_front
+from .statistics import CONFIDENCE, Interval, Spread, interval, log_interval, spread
+
+SCHEMA = "rtgi-chart/1"
+# What a setting costs, by the names of Point's attributes.
+COSTS = ("seconds", "rays", "peak_bytes")
+MEBIBYTE = float(1 << 20)
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """``spread`` of the error over seeds, ``bias`` with its interval, and means of the other figures of measure.Errors."""
+
+    spread: Spread
+    bias: Interval
+    relmse: float
+    energy: float
+    leak: float | None
+    true_leak: float | None
+    minimum: float
+
+
+@dataclass(frozen=True)
+class Point:
+    """One setting of one technique, measured with some seeds. ``label`` says what differs from the defaults; ``default`` is true
+    for the defaults themselves; ``accuracy`` is by place (measure.PLACES); ``runs`` are the single bakes as plain values."""
+
+    technique: str
+    technique_label: str
+    label: str
+    default: bool
+    settings: dict
+    seconds: Interval
+    cpu_seconds: Interval
+    rays: Interval
+    peak_bytes: Interval | None
+    field_bytes: int
+    lookup_seconds: float
+    accuracy: dict[str, Accuracy]
+    runs: tuple[dict, ...]
+
+    def error(self, place: str = "surface") -> float:
+        """Relative RMSE in ``place``, mean over seeds."""
+        return self.accuracy[place].spread.error.mean
+
+    def cost(self, name: str) -> float | None:
+        """One of COSTS, mean over seeds; None where it is not known."""
+        value = getattr(self, name)
+        return None if value is None else value.mean
+
+
+@dataclass(frozen=True)
+class Chart:
+    """All that was measured on one scene. ``points`` are in the order of techniques and their sweeps; ``left_out`` says, a line
+    each, what was not measured and why; ``complete`` is false for a chart that was cancelled. ``reference`` holds kind and noise,
+    ``receivers`` their numbers, ``floor`` the least error that can be told from none, ``machine`` where it ran."""
+
+    scene: str
+    reference: dict
+    receivers: dict
+    floor: float
+    seeds: int
+    threads: int | None
+    machine: dict
+    points: tuple[Point, ...]
+    left_out: tuple[str, ...] = ()
+    complete: bool = True
+
+    def front(self, cost: str = "seconds", place: str = "surface") -> list[int]:
+        """Indices of the points on the Pareto front of ``cost`` and error in ``place``, by rising cost."""
+        rows = [index for index, point in enumerate(self.points) if point.cost(cost) is not None]
+        found = pareto_front([self.points[row].cost(cost) for row in rows], [self.points[row].error(place) for row in rows])
+        return [rows[index] for index in found]
+
+    def techniques(self) -> list[str]:
+        """Names of the techniques that were measured, in order."""
+        return list(dict.fromkeys(point.technique for point in self.points))
+
+    def to_json(self) -> dict:
+        """Everything, as plain values once infinities are dealt with (exchange.plain)."""
+        return {"schema": SCHEMA, "confidence": CONFIDENCE, **asdict(self),
+                "fronts": {cost: self.front(cost) for cost in COSTS}}
+
+
+def point_of(yard: Yard, technique: Technique, runs: list[Run]) -> Point:
+    """The figures of ``runs``: one setting of ``technique``, one run a seed."""
+    settings, default = runs[0].settings, technique.Settings()
+    peaks = [run.costs.peak_bytes for run in runs]
+    return Point(
+        technique.name, technique.label, setting_label(settings, default), settings == default, asdict(settings),
+        seconds=log_interval([run.costs.seconds for run in runs]),
+        cpu_seconds=log_interval([run.costs.cpu_seconds for run in runs]),
+        rays=interval([run.costs.rays for run in runs]), peak_bytes=None if None in peaks else interval(peaks),
+        field_bytes=runs[0].field_bytes, lookup_seconds=min(run.lookup_seconds for run in runs),
+        accuracy={place: _accuracy(yard, technique, runs, place) for place in runs[0].errors},
+        runs=tuple({"seed": run.seed, **asdict(run.costs), "lookup_seconds": run.lookup_seconds,
+                    "errors": {place: asdict(errors) for place, errors in run.errors.items()}} for run in runs))
+
+
+def setting_label(settings, default) -> str:
+    """What sets ``settings`` apart from ``default``, as short as the settings' own labels allow."""
+    parts = []
+    for item in fields(settings):
+        value = getattr(settings, item.name)
+        if value != getattr(default, item.name):
+            name = " ".join(word if word.isupper() else word.lower() for word in item.metadata["label"].split())
+            parts.append(name if value is True else f"no {name}" if value is False else f"{value:,g} {name}"
+                         if isinstance(value, int) and name.endswith("s") else f"{name} {_number(value)}")
+    return ", ".join(parts) or "defaults"
+
+
+def _number(value) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _accuracy(yard: Yard, technique: Technique, runs: list[Run], place: str) -> Accuracy:
+    errors = [run.errors[place] for run in runs]
+
+    def mean(name):
+        values = [getattr(one, name) for one in errors]
+        return None if None in values else sum(values) / len(values)
+
+    return Accuracy(spread(yard, technique, runs, place), interval([one.bias for one in errors]), mean("relmse"), mean("energy"),
+                    mean("leak"), mean("true_leak"), mean("minimum"))

@@ -1,0 +1,143 @@
+"""A chart as Markdown: every figure, and what each technique has to offer at equal time and at equal error."""
+
+from .chart_data import MEBIBYTE, Chart, Point
+from .pareto import best_within, cheapest_within, round_steps
+from .statistics import Interval
+
+# Rows of the equal-time and equal-error tables at most.
+MOST_ROWS = 9
+ERROR_STEPS = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
+
+
+def markdown(chart: Chart, pictures: tuple[str, ...] = ()) -> str:
+    """The whole report; ``pictures`` are file names to show, those that were drawn."""
+    reference, receivers = chart.reference, chart.receivers
+    parts = [
+        f"# {chart.scene}: speed against accuracy",
+        *([] if chart.complete else ["**Cancelled before the end: not every setting has every seed.**"]),
+        f"Errors are relative RMSE of irradiance against a {reference['kind']} reference (its own noise of "
+        f"{_percent(reference['noise'])} is subtracted) at {receivers['points']} surface points under their own normals, and just "
+        f"above each under {receivers['normals'] - 1} other{'s' * (receivers['normals'] != 2)}. Errors below "
+        f"{_percent(chart.floor)} cannot be told from none. {chart.seeds} seed{'s' * (chart.seeds > 1)}; ± and ranges are 95 % "
+        f"confidence intervals. Times are wall clock on {chart.machine['cores']} cores"
+        + (f" with {chart.threads} threads" if chart.threads else "") + ".",
+        *(f"![{name}]({name})" for name in pictures),
+        "## Every setting", _settings_table(chart),
+        "*Surface*: the technique's own light at all receivers; *own normals*: of these, only on surfaces under their own normal; "
+        "*shipped*: all receivers lit by the baked probes, as in an engine; *probes*: SH at the probes, nothing interpolated; "
+        "*systematic* and *noise*: what all seeds have in common of the surface error, and what differs between them. *Memory*: "
+        "the bake's peak above what was held before. *Look-up*: one surface point of the technique's own field, on the CPU.",
+        "## At equal time", "The least surface error that a technique reaches within the time; only measured settings, nothing "
+        "interpolated.", _equal_time(chart),
+        "## At equal error", "The least time in which a technique reaches the error.", _equal_error(chart),
+        *_known(chart), *_leaks(chart),
+        *(["## Left out", *(f"- {line}" for line in chart.left_out)] if chart.left_out else []),
+    ]
+    return "\n\n".join(parts).replace("\n\n- ", "\n- ") + "\n"
+
+
+def summary(chart: Chart) -> str:
+    """A few lines for a terminal: the Pareto front."""
+    lines = []
+    for index in chart.front():
+        point = chart.points[index]
+        lines.append(f"  {_seconds(point.seconds.mean):>8}  {_percent(point.error()):>7}  {point.technique}, {point.label}")
+    return "\n".join(["  time      error    the least time for this error", *lines])
+
+
+def _settings_table(chart: Chart) -> str:
+    front = set(chart.front())
+    rows = []
+    for index, point in enumerate(chart.points):
+        surface = point.accuracy["surface"]
+        rows.append([
+            point.technique, point.label + (" ◆" if index in front else ""), _range(point.seconds, _seconds),
+            _seconds(point.cpu_seconds.mean), f"{point.rays.mean / 1e6:.2f}",
+            "–" if point.peak_bytes is None else f"{point.peak_bytes.mean / MEBIBYTE:.0f}", f"{1e6 * point.lookup_seconds:.0f}",
+            _range(surface.spread.error, _percent), _signed(surface.bias), _percent(surface.spread.systematic),
+            _percent(surface.spread.random), f"{surface.energy:.3f}", f"{surface.relmse:.3g}",
+            *(_percent(point.error(place)) for place in ("own_normals", "shipped", "probes"))])
+    heads = ["technique", "setting (◆ on the Pareto front)", "time", "CPU time", "rays [M]", "memory [MiB]",
+             "look-up [µs]", "surface error", "bias", "systematic", "noise", "energy", "relMSE", "own normals", "shipped", "probes"]
+    return _table(heads, rows, 2)
+
+
+def _equal_time(chart: Chart) -> str:
+    times = [point.seconds.mean for point in chart.points]
+    steps = _thinned(round_steps(min(times), max(times)))
+
+    def cell(points: list[Point], budget: float) -> str:
+        index = best_within([point.seconds.mean for point in points], [point.error() for point in points], budget)
+        return "–" if index is None else f"{_percent(points[index].error())} ({points[index].label})"
+
+    return _by_technique(chart, "within", [(step, _seconds(step)) for step in steps], cell)
+
+
+def _equal_error(chart: Chart) -> str:
+    errors = [max(point.error(), 1e-4) for point in chart.points]
+    steps = _thinned(round_steps(min(errors), max(errors), ERROR_STEPS))
+
+    def cell(points: list[Point], target: float) -> str:
+        index = cheapest_within([point.seconds.mean for point in points], [point.error() for point in points], target)
+        return "–" if index is None else f"{_seconds(points[index].seconds.mean)} ({points[index].label})"
+
+    return _by_technique(chart, "at most", [(step, _percent(step)) for step in reversed(steps)], cell)
+
+
+def _by_technique(chart: Chart, head: str, steps, cell) -> str:
+    names = chart.techniques()
+    groups = {name: [point for point in chart.points if point.technique == name] for name in names}
+    return _table([head, *names], [[text, *(cell(groups[name], step) for name in names)] for step, text in steps], 1)
+
+
+def _known(chart: Chart) -> list[str]:
+    rows = [[point.technique, point.label, _range(known.spread.error, _percent), _signed(known.bias), f"{known.energy:.3f}"]
+            for point in chart.points if (known := point.accuracy.get("known"))]
+    if not rows:
+        return []
+    return ["## Against what a technique knows",
+            "These techniques hold a part of the light by design; here their reference is that part "
+            "alone, by the path tracer.", _table(["technique", "setting", "error", "bias", "energy"], rows, 2)]
+
+
+def _leaks(chart: Chart) -> list[str]:
+    rows = [[point.technique, point.label, f"{surface.leak:.2g}", f"{shipped.leak:.2g}", f"{surface.true_leak:.2g}"]
+            for point in chart.points
+            if (surface := point.accuracy["surface"]).leak is not None and (shipped := point.accuracy["shipped"]).leak is not None]
+    if not rows:
+        return []
+    return ["## Leaks",
+            f"Mean irradiance of the {chart.receivers['dark']} dark receivers (less than a hundredth of the mean) relative to "
+            "that of the others.", _table(["technique", "setting", "surface", "shipped", "exact"], rows, 2)]
+
+
+def _table(heads: list[str], rows: list[list[str]], text_columns: int) -> str:
+    rule = ["---" if column < text_columns else "---:" for column in range(len(heads))]
+    return "\n".join("| " + " | ".join(cells) + " |" for cells in [heads, rule, *rows])
+
+
+def _thinned(steps: list[float]) -> list[float]:
+    """At most MOST_ROWS of ``steps``, the last one among them."""
+    stride = -(-len(steps) // MOST_ROWS)
+    return steps[::-1][::stride][::-1]
+
+
+def _percent(value: float | None) -> str:
+    if value is None:
+        return "–"
+    return f"{100 * value:.2g} %" if value < 0.0995 else f"{100 * value:.0f} %"
+
+
+def _seconds(value: float) -> str:
+    return f"{1000 * value:.0f} ms" if value < 0.0995 else f"{value:.2f} s" if value < 9.95 else f"{value:,.0f} s"
+
+
+def _range(value: Interval, text) -> str:
+    if value.low is None or text(value.low) == text(value.high):
+        return text(value.mean)
+    return f"{text(value.mean)} ({text(value.low)} – {text(value.high)})"
+
+
+def _signed(value: Interval) -> str:
+    half = "" if value.low is None else f" ± {50 * (value.high - value.low):.2g}"
+    return f"{100 * value.mean:+.2g}{half} %"
