@@ -13,10 +13,9 @@ import numpy as np
 from ..numerics import sh
 from ..scene import Scene, World
 from .device import dispatch
-from .program import Image, Program
+from .program import Program
+from .programs import indirect_program
 from .uniforms import UniformStruct
-
-FRAME = UniformStruct("IndirectFrame", (("ivec2", "size"),))
 
 
 class Indirect(Protocol):
@@ -49,12 +48,6 @@ class Indirect(Protocol):
 
     def close(self) -> None:
         """Let go of workers."""
-
-
-def indirect_program(name: str, uniforms: tuple = (), samplers: tuple[str, ...] = (), defines: tuple = ()) -> Program:
-    """The program of ``shaders/NAME.comp.glsl`` with the frame's resources in front of the technique's own."""
-    return Program(name, uniforms=(("frame", FRAME), *uniforms), samplers=("gbuffer_position", "gbuffer_normal", *samplers),
-                   images=(Image("irradiance"),), local_size=(8, 8), defines=defines)
 
 
 def draw_indirect(indirect: Indirect, gbuffer: Mapping[str, gpu.types.GPUTexture], irradiance: gpu.types.GPUTexture) -> None:

@@ -165,3 +165,11 @@ FILM = Program(
     samplers=("world", "direct_radiance", "indirect_irradiance",
               *(f"gbuffer_{name}" for name in ("position", "normal", "albedo", "emission"))),
     images=(Image("mean", access="READ_WRITE"),), local_size=_GROUP)
+
+INDIRECT_FRAME = UniformStruct("IndirectFrame", (("ivec2", "size"),))
+
+
+def indirect_program(name: str, uniforms: tuple = (), samplers: tuple[str, ...] = (), defines: tuple = ()) -> Program:
+    """The program of ``shaders/NAME.comp.glsl`` with the frame's resources in front of the technique's own."""
+    return Program(name, uniforms=(("frame", INDIRECT_FRAME), *uniforms), defines=defines, images=(Image("irradiance"),),
+                   samplers=("gbuffer_position", "gbuffer_normal", *samplers), local_size=_GROUP)

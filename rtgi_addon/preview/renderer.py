@@ -12,7 +12,7 @@ from .camera_view import CameraView
 from .direct_light import DirectLight
 from .film import Background, Film
 from .gbuffer import GBuffer, gbuffer_surfaces
-from .indirect import make_indirect
+from .indirect import FRAME_SAMPLES, make_indirect
 from .indirect_pass import Indirect, draw_indirect
 from .materials import Images
 from .pixel_filter import filter_offset
@@ -40,7 +40,7 @@ class PreviewRenderer:
         self._background = Background(scene.world)
         self._lamps = DirectLight(self.settings)
         self._baked = baked or scene
-        self._indirect: Indirect = make_indirect(field, self._baked)
+        self._indirect: Indirect = make_indirect(field, self._baked, samples=FRAME_SAMPLES)
         self._gbuffer: GBuffer | None = None
         self._film: Film | None = None
         self._view: CameraView | None = None

@@ -8,15 +8,27 @@ import pytest
 
 moderngl = pytest.importorskip("moderngl", reason="moderngl is not installed: it is for benchmarks")
 
+import scene_builders as build  # noqa: E402
+from probe_bakes import QUICK  # noqa: E402
+from receivers import directions, points_in  # noqa: E402
+
 from benchmarks.bare_gl import BareContext  # noqa: E402
 from rtgi_addon.preview import programs  # noqa: E402
 from rtgi_addon.preview.atlas import Atlas  # noqa: E402
+from rtgi_addon.preview.indirect.lpv import lpv_tables  # noqa: E402
+from rtgi_addon.preview.indirect.probes import probe_tables  # noqa: E402
+from rtgi_addon.preview.indirect.rsm import rsm_tables  # noqa: E402
+from rtgi_addon.preview.indirect.vpl import vpl_tables  # noqa: E402
 from rtgi_addon.preview.packing import FLUX_SCALE, face_blocks  # noqa: E402
 from rtgi_addon.preview.program import Program  # noqa: E402
+from rtgi_addon.progress import Progress  # noqa: E402
+from rtgi_addon.techniques import get  # noqa: E402
 from rtgi_addon.techniques.lpv.geometry_volume import Surfels, face_blocking, inject_surfels  # noqa: E402
 from rtgi_addon.techniques.lpv.grid import SIDE_AHEAD, LpvGrid  # noqa: E402
 from rtgi_addon.techniques.lpv.propagation import propagate  # noqa: E402
 
+SMALL = {"probes": QUICK, "lpv": {"steps": 8, "map_resolution": 32, "cascades": 2}, "rsm": {"resolution": 32, "samples": 64},
+         "vpl": {"lights": 200, "compensation": False}}
 PROGRAMS = [value for value in vars(programs).values() if isinstance(value, Program)]
 CHANNELS = ("red", "green", "blue")
 
@@ -78,3 +90,21 @@ def test_one_step_of_light_is_numpys(bare):
     for channel in range(3):
         found = np.moveaxis(atlas.unpack(bare.download(total[channel])) / FLUX_SCALE, -1, 0)
         assert np.abs(found - expected[:, channel]).max() < 1e-5 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_irradiance_is_the_fields(bare, name):
+    scene = build.closed_box(albedo=0.6, light_position=(0.2, -0.3, 0.4))
+    field = get(name).bake(scene, get(name).Settings(order=1, **SMALL[name]), np.random.default_rng(0), Progress())
+    tables = {"probes": probe_tables, "lpv": lpv_tables, "rsm": rsm_tables, "vpl": vpl_tables}[name](field)
+    points, normals = points_in(0.8, 1024), directions(1024)
+    receivers = np.zeros((2, 32, 32, 4), np.float32)
+    receivers[0, ..., :3], receivers[1, ..., :3] = points.reshape(32, 32, 3), normals.reshape(32, 32, 3)
+    samplers = {sampler: bare.upload(texels) for sampler, texels in tables.textures.items()}
+    target = bare.empty(32, 32)
+    bare.dispatch(tables.program, (32, 32), uniforms={"frame": {"size": (32, 32)}, "indirect": tables.values},
+                  samplers={"gbuffer_position": bare.upload(receivers[0]), "gbuffer_normal": bare.upload(receivers[1]), **samplers},
+                  images={"irradiance": target})
+    expected = field.irradiance(points, normals)
+    difference = np.abs(bare.download(target)[..., :3].reshape(-1, 3) - expected).max(axis=1) / expected.max()
+    assert np.quantile(difference, 0.98) < 2e-5 and difference.max() < 0.05

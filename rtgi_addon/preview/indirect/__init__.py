@@ -9,6 +9,10 @@ from functools import partial
 from ...scene import Scene
 from ...techniques.base import Field
 
+# What a receiver reads in a frame that others are averaged with, of a technique that samples: a few dozen frames have more than the
+# bake's own settings ask for.
+FRAME_SAMPLES = 64
+
 
 def make_indirect(field: Field | None, scene: Scene, *, samples: int | None = None):
     """The indirect light (indirect_pass.Indirect) of ``field`` as baked from ``scene``: the technique's own function, or that of
@@ -35,7 +39,7 @@ def make_indirect(field: Field | None, scene: Scene, *, samples: int | None = No
     if isinstance(field, LpvField):
         return LpvLight(field)
     if isinstance(field, VplField):
-        return RelitLight(field, partial(vpl_tables, samples=samples))
+        return RelitLight(field, partial(vpl_tables, samples=samples), includes_direct=False)
     if isinstance(field, RsmField):
         return rsm_light(field, samples)
     return RelitLight(field, grid_tables)

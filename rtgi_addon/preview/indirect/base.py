@@ -5,7 +5,7 @@ import numpy as np
 
 from ...scene import Scene
 from ..device import uniform_buffer
-from ..indirect_pass import draw_indirect, indirect_program
+from ..indirect_pass import draw_indirect
 from ..program import Program
 from ..textures import download, empty, upload
 from .tables import UNIFORMS, Tables
@@ -27,7 +27,7 @@ class FieldLight:
     def set(self, tables: Tables) -> None:
         """Show ``tables`` from now on."""
         self.samplers: dict[str, gpu.types.GPUTexture] = {name: upload(texels) for name, texels in tables.textures.items()}
-        self.program: Program = indirect_program(tables.name, ((UNIFORMS, tables.struct),), tuple(self.samplers), tables.defines)
+        self.program: Program = tables.program
         self.uniforms: dict[str, gpu.types.GPUUniformBuf] = {UNIFORMS: uniform_buffer(tables.struct, tables.values)}
 
     @property

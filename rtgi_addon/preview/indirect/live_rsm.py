@@ -17,7 +17,7 @@ from ..programs import RSM_QUANTIZE, RSM_STORE, RSM_SUM_ROWS
 from ..textures import empty, upload
 from .base import FieldLight
 from .relighting import RelitLight
-from .rsm import STRUCT, Sheet, map_rows, pattern_of, pattern_rows, rsm_tables, rsm_values
+from .rsm import STRUCT, Sheet, least_of, map_rows, pattern_of, pattern_rows, rsm_tables, rsm_values
 from .tables import UNIFORMS
 
 
@@ -40,7 +40,7 @@ class RsmLight(FieldLight):
 
     def __init__(self, field: RsmField, samples: int | None = None):
         super().__init__(rsm_tables(field, samples), field.includes_direct)
-        self._capture, self._pattern = field.capture, pattern_of(field, samples)
+        self._capture, self._pattern, self._least = field.capture, pattern_of(field, samples), least_of(samples)
 
     def follow(self, scene: Scene) -> bool:
         """See FieldLight."""
@@ -54,7 +54,8 @@ class RsmLight(FieldLight):
         strength = np.array([float(luminance(texel_power(scene.lights[view.lamp], view).sum(axis=(0, 1), dtype=np.float64)))
                              for view in views])
         views, strength = [view for view, power in zip(views, strength, strict=True) if power > 0], strength[strength > 0]
-        counts, before = shared_samples(strength, np.array([view.lamp for view in views], np.intp), self._pattern.samples)
+        counts, before = shared_samples(strength, np.array([view.lamp for view in views], np.intp), self._pattern.samples,
+                                        self._least)
         parts = [places(self._pattern, count, first) for count, first in zip(counts, before, strict=True)]
         sheet = Sheet([view.resolution for view in views])
         texels, cumulative = empty(3 * sheet.size[0], sheet.size[1]), empty(*sheet.size, "R32F")

@@ -14,13 +14,14 @@ from .tables import Tables
 class RelitLight(FieldLight):
     """The irradiance function of ``field``, followed through ``relight`` on a worker (None: the field's own).
 
-    ``tables_of`` makes the tables of a field; it runs on the worker too. Scenes that arrive while one is worked on wait for it, all
-    but the newest forgotten, so that light keeps pace with a lamp that is dragged.
+    ``tables_of`` makes the tables of a field; it runs on the worker too. ``includes_direct`` (None: as the field says) is whether
+    lamps are in them. Scenes that arrive while one is worked on wait for it, all but the newest forgotten, so that light keeps
+    pace with a lamp that is dragged.
     """
 
     def __init__(self, field: Field, tables_of: Callable[[Field], Tables],
-                 relight: Callable[[Scene, Progress], Field] | None = None):
-        super().__init__(tables_of(field), field.includes_direct)
+                 relight: Callable[[Scene, Progress], Field] | None = None, *, includes_direct: bool | None = None):
+        super().__init__(tables_of(field), field.includes_direct if includes_direct is None else includes_direct)
         self._tables_of, self._relight = tables_of, relight or getattr(field, "relight", None)
         self._name = field.technique
         self._lock = threading.Lock()

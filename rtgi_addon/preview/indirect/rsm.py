@@ -6,7 +6,7 @@ import numpy as np
 
 from ...numerics.sampling import hash_u32
 from ...techniques.rsm.field import RsmField
-from ...techniques.rsm.gather import Pattern, prepare
+from ...techniques.rsm.gather import MIN_SAMPLES, Pattern, prepare
 from ...transport.shadow_views import ShadowView
 from ..packing import fold, map_texels
 from ..uniforms import UniformStruct
@@ -34,7 +34,7 @@ class Sheet:
 def rsm_tables(field: RsmField, samples: int | None = None) -> Tables:
     """The maps of ``field``, sampled as it does, or with ``samples`` texels a lamp."""
     pattern = pattern_of(field, samples)
-    maps = prepare(field.maps, pattern.samples)
+    maps = prepare(field.maps, pattern.samples, least_of(samples))
     sheet = Sheet([item.view.resolution for item in maps])
     width, height = sheet.size
     texels, cumulative = np.zeros((height, 3 * width, 4), np.float32), np.zeros((height, width), np.float32)
@@ -51,6 +51,11 @@ def rsm_tables(field: RsmField, samples: int | None = None) -> Tables:
 def pattern_of(field: RsmField, samples: int | None) -> Pattern:
     """How ``field`` chooses texels, with another number of ``samples`` if one is given."""
     return field.pattern if samples is None else replace(field.pattern, samples=samples)
+
+
+def least_of(samples: int | None) -> int:
+    """The fewest samples of a map: frames that are averaged may be left with one."""
+    return MIN_SAMPLES if samples is None else 1
 
 
 def pattern_rows(parts: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:

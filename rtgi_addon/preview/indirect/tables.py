@@ -1,9 +1,11 @@
 """What an irradiance function reads, as arrays; knows no GPU, so that every host of the shaders can have it."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
+from ..program import Program
+from ..programs import indirect_program
 from ..uniforms import UniformStruct
 
 # The name of the functions' uniform buffer in the shaders.
@@ -22,4 +24,9 @@ class Tables:
     struct: UniformStruct
     values: dict
     textures: dict[str, np.ndarray]
-    defines: tuple[tuple[str, str], ...] = field(default=())
+    defines: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def program(self) -> Program:
+        """The program that fills an image of irradiance."""
+        return indirect_program(self.name, ((UNIFORMS, self.struct),), tuple(self.textures), self.defines)

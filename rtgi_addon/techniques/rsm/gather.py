@@ -121,22 +121,25 @@ def places(pattern: Pattern, samples: int, first: int) -> tuple[np.ndarray, np.n
     return r2(in_disk, pattern.seed, first), r2(samples - in_disk, pattern.seed + 1, first)
 
 
-def shared_samples(strength: np.ndarray, lamp: np.ndarray, samples: int) -> tuple[list[int], list[int]]:
-    """How many of each lamp's ``samples`` its maps of ``strength`` (n,), indexed by ``lamp`` (n,), take, and how many those before
-    them have taken."""
+def shared_samples(strength: np.ndarray, lamp: np.ndarray, samples: int,
+                   least: int = MIN_SAMPLES) -> tuple[list[int], list[int]]:
+    """How many of each lamp's ``samples`` its maps of ``strength`` (n,), indexed by ``lamp`` (n,), take, ``least`` or more each,
+    and how many those before them have taken."""
     if not len(strength):
         return [], []
     share = 0.5 / np.maximum(np.bincount(lamp)[lamp], 1) + 0.5 * strength / np.bincount(lamp, strength)[lamp]
-    counts = [max(MIN_SAMPLES, round(samples * part)) for part in share]
-    before = [sum(count for other, count in zip(lamp[:i], counts, strict=False) if other == lamp[i]) for i in range(len(counts))]
+    counts = [max(least, round(samples * part)) for part in share]
+    before = [sum(count for other, count in zip(lamp[:i], counts, strict=False) if other == own) for i, own in enumerate(lamp)]
     return counts, before
 
 
-def prepare(maps: tuple[ReflectiveShadowMap, ...], samples: int) -> tuple[GatherMap, ...]:
-    """Maps ready to be gathered from, each with its part of the ``samples`` of its lamp. Those without flux are left out."""
+def prepare(maps: tuple[ReflectiveShadowMap, ...], samples: int,
+            least: int = MIN_SAMPLES) -> tuple[GatherMap, ...]:
+    """Maps ready to be gathered from, each with its part of the ``samples`` of its lamp, ``least`` or more. Those without flux are
+    left out."""
     strength = np.array([float(luminance(item.total_flux)) for item in maps])
     maps, strength = [item for item, flux in zip(maps, strength, strict=True) if flux > 0], strength[strength > 0]
-    counts, before = shared_samples(strength, np.array([item.view.lamp for item in maps], np.intp), samples)
+    counts, before = shared_samples(strength, np.array([item.view.lamp for item in maps], np.intp), samples, least)
     return tuple(GatherMap(*each) for each in zip(maps, counts, before, strict=True))
 
 
