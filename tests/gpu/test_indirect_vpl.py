@@ -103,3 +103,20 @@ def test_lights_follow_a_moved_lamp(indirect):
     points, normals = points_in(0.9, 500), directions(500)
     assert relative_error(made, field.relight(moved), points, normals).max() < TOLERANCE
     made.close()
+
+
+def test_lights_that_stay_are_not_traced_again(monkeypatch):
+    from rtgi_addon.preview.indirect import vpl_shadows
+    field = bake(rooms.two_rooms(resolution=(2, 2, 2), half_size=(2.0, 0.95, 0.95)))
+    lights, traced, seen = field.lights, [], vpl_shadows.SeenPlanes()
+    light_planes = vpl_shadows.light_planes
+    monkeypatch.setattr(vpl_shadows, "light_planes", lambda context, positions, *rest:
+                        traced.append(len(positions)) or light_planes(context, positions, *rest))
+    whole = seen.of_lights(field.context, lights.positions, lights.normals)
+    # Another order, ten of them gone and five new.
+    rows = np.random.default_rng(0).permutation(lights.count)[10:]
+    positions, normals = lights.positions[rows].copy(), lights.normals[rows]
+    positions[:5] += 0.01 * normals[:5]
+    again = seen.of_lights(field.context, positions, normals)
+    assert traced == [lights.count, 5]
+    assert np.array_equal(again[5:], whole[rows[5:]]) and not np.array_equal(again[:5], whole[rows[:5]])

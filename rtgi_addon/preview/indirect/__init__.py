@@ -11,7 +11,7 @@ from ...techniques.base import Field
 
 # What a receiver reads in a frame that others are averaged with, of a technique that samples: a few dozen frames have more than the
 # bake's own settings ask for.
-FRAME_SAMPLES = 64
+FRAME_SAMPLES = 32
 
 
 def make_indirect(field: Field | None, scene: Scene, *, samples: int | None = None):
@@ -32,6 +32,7 @@ def make_indirect(field: Field | None, scene: Scene, *, samples: int | None = No
     from .probes import probe_tables
     from .relighting import RelitLight
     from .vpl import vpl_tables
+    from .vpl_shadows import SeenPlanes
     if field is None:
         return WorldLight(scene)
     if isinstance(field, ProbeField):
@@ -39,7 +40,7 @@ def make_indirect(field: Field | None, scene: Scene, *, samples: int | None = No
     if isinstance(field, LpvField):
         return LpvLight(field)
     if isinstance(field, VplField):
-        return RelitLight(field, partial(vpl_tables, samples=samples), includes_direct=False)
+        return RelitLight(field, partial(vpl_tables, samples=samples, seen=SeenPlanes()), includes_direct=False)
     if isinstance(field, RsmField):
         return rsm_light(field, samples)
     return RelitLight(field, grid_tables)

@@ -12,7 +12,7 @@ from ...transport.rays import SELF_INTERSECTION
 from ..packing import fold, light_rows
 from ..uniforms import UniformStruct
 from .tables import Tables
-from .vpl_shadows import DISTANT_SIDE, DISTANT_TOLERANCE, SIDE, TOLERANCE, distant_planes, focus, light_planes
+from .vpl_shadows import DISTANT_SIDE, DISTANT_TOLERANCE, SIDE, TOLERANCE, SeenPlanes, focus
 
 STRUCT = UniformStruct("VirtualLights", (
     ("vec4", "focus"), ("int", "count"), ("int", "distant_count"), ("int", "stride"), ("float", "clamp_at"),
@@ -20,9 +20,9 @@ STRUCT = UniformStruct("VirtualLights", (
     ("float", "self_intersection"), ("uint", "seed_state")))
 
 
-def vpl_tables(field: VplField, samples: int | None = None) -> Tables:
+def vpl_tables(field: VplField, samples: int | None = None, seen: SeenPlanes | None = None) -> Tables:
     """The virtual lights of ``field`` and what they see. With ``samples`` a receiver reads about so many of them, those of its own
-    turn, for all."""
+    turn, for all. ``seen`` remembers for the next field what this one's lights see."""
     lights, context = field.lights, field.context
     centre, radius = focus(context)
     total = lights.count + lights.distant_count
@@ -34,8 +34,9 @@ def vpl_tables(field: VplField, samples: int | None = None) -> Tables:
               "clamp_at": np.float32(3e38) if field.clamp is None else field.clamp, "side": SIDE, "distant_side": DISTANT_SIDE,
               "tolerance": TOLERANCE, "distant_tolerance": DISTANT_TOLERANCE * 2.0 * radius / DISTANT_SIDE,
               "self_intersection": SELF_INTERSECTION, "seed_state": int(hash_u32(0x76706C))}
-    planes = light_planes(context, lights.positions, lights.normals)
-    distant_seen = distant_planes(context, lights.directions)
+    seen = seen or SeenPlanes()
+    planes = seen.of_lights(context, lights.positions, lights.normals)
+    distant_seen = seen.of_distant(context, lights.directions)
     return Tables("indirect_vpl", STRUCT, values, {
         "lights": fold(light_rows(lights)), "distant_lights": fold(distant),
         "planes": fold(planes.reshape(-1, 4)), "distant_planes": fold(distant_seen.reshape(-1, 4))})

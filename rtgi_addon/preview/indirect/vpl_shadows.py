@@ -76,6 +76,32 @@ def distant_planes(context: LightContext, directions: np.ndarray, side: int = DI
     return _planes(context, rays, len(directions), side * side)
 
 
+class SeenPlanes:
+    """Planes of one geometry's lights, of which those that stayed where they were need no rays again."""
+
+    def __init__(self):
+        self._lights, self._planes = np.zeros((0, 6), np.float32), np.zeros((0, SIDE * SIDE, 4), np.float32)
+        self._directions, self._distant = np.zeros((0, 3), np.float32), np.zeros((0, DISTANT_SIDE**2, 4), np.float32)
+
+    def of_lights(self, context: LightContext, positions: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """See ``light_planes``."""
+        lights = np.ascontiguousarray(np.concatenate([positions, normals], axis=1), np.float32)
+        known = {row.tobytes(): index for index, row in enumerate(self._lights)}
+        before = np.array([known.get(row.tobytes(), -1) for row in lights], np.intp)
+        planes = np.empty((len(lights), SIDE * SIDE, 4), np.float32)
+        old, new = np.flatnonzero(before >= 0), np.flatnonzero(before < 0)
+        planes[old] = self._planes[before[old]]
+        planes[new] = light_planes(context, positions[new], normals[new])
+        self._lights, self._planes = lights, planes
+        return planes
+
+    def of_distant(self, context: LightContext, directions: np.ndarray) -> np.ndarray:
+        """See ``distant_planes``."""
+        if not np.array_equal(directions, self._directions):
+            self._directions, self._distant = directions, distant_planes(context, directions)
+        return self._distant
+
+
 def _planes(context: LightContext, rays, count: int, per_light: int) -> np.ndarray:
     result = np.empty((count, per_light, 4), np.float32)
     spans = chunks(count, max(1, CHUNK // per_light))
