@@ -64,12 +64,14 @@ def test_it_comes_back_to_the_same_picture(seen, moment):
     np.testing.assert_allclose(seen[moment], seen["lamp moved"], atol=0.01)
 
 
-def test_an_opened_file_shows_the_bundle_on_disk(seen):
-    np.testing.assert_allclose(seen["opened again"], seen["baked"], atol=0.01)
+@pytest.mark.parametrize("moment", ["opened again", "enabled again"])
+def test_an_opened_file_shows_the_bundle_on_disk(seen, moment):
+    np.testing.assert_allclose(seen[moment], seen["baked"], atol=0.01)
 
 
 def test_viewports_come_and_go_with_the_engine(seen):
     assert seen["viewports"] == 2
+    assert seen["viewports while disabled"] == 0
     assert seen["viewports left"] == 0
 
 

@@ -4,12 +4,14 @@ panel, moves a lamp, renders, undoes, opens a second window and a file, and look
 It opens FILE; what it saw goes to REPORT as JSON, screenshots to the folder beside it.
 """
 
+import gc
 import importlib
 import json
 import sys
 import traceback
 from pathlib import Path
 
+import addon_utils
 import bpy
 import numpy as np
 
@@ -77,7 +79,6 @@ def settled():
 
 
 def live_viewports():
-    import gc
     viewport = importlib.import_module(f"{ADDON}.blender.engine.viewport").Viewport
     return [found for found in gc.get_objects() if isinstance(found, viewport)]
 
@@ -177,11 +178,19 @@ def story():
     yield from open_scene()
     yield from until(settled)
     looked_at("opened again")
+    addon_utils.disable(ADDON.rpartition(".")[0])
+    yield 1.0
+    gc.collect()
+    seen["viewports while disabled"] = len(live_viewports())
+    addon_utils.enable(ADDON.rpartition(".")[0])
+    yield 1.0
+    yield from until(settled)
+    looked_at("enabled again")
+
     window().scene.render.engine = "BLENDER_EEVEE" if bpy.app.version >= (5, 0) else "BLENDER_EEVEE_NEXT"
     yield 1.0
     area("VIEW_3D").spaces.active.shading.type = "SOLID"
     yield 0.5
-    import gc
     gc.collect()
     seen["viewports left"] = sum(found._renderer is not None for found in live_viewports())
 
