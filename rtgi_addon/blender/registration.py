@@ -2,14 +2,25 @@
 
 from types import ModuleType
 
-from . import chart_ui, dependencies, engine, handlers, operators, panels, preview_panels, preview_settings, properties
+from . import (
+    chart_ui,
+    dependencies,
+    engine,
+    handlers,
+    operators,
+    panels,
+    preview_panels,
+    preview_settings,
+    properties,
+    stability_ui,
+)
 
 _registered: list[ModuleType] = []
 
 
 def _modules() -> list[ModuleType]:
     """Everything, less what cannot be imported while required packages are missing: then the panels say what to install."""
-    modules = [properties, preview_settings, operators, panels, chart_ui, preview_panels, engine, handlers]
+    modules = [properties, preview_settings, operators, panels, chart_ui, stability_ui, preview_panels, engine, handlers]
     if not dependencies.missing_required():
         from . import cli
 

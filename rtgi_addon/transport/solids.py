@@ -89,7 +89,7 @@ def closed_components(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _parts(triangles: np.ndarray, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
-    """``closed_components`` of ``triangles`` (t, 3) as their indices tell it; those that name a vertex twice neither open nor close."""
+    """``closed_components`` of ``triangles`` (t, 3) as their indices tell it. Those that name a vertex twice have no say in it."""
     label = _connected(triangles, vertex_count)
     of_row = np.flatnonzero(np.all(triangles != np.roll(triangles, -1, axis=1), axis=1))
     triangles = triangles[of_row]

@@ -149,3 +149,13 @@ def test_mirrored_instances_keep_their_outside(scale):
     scene = replace(scene, instances=(Instance("crate", 0, build.transform((5, 0, 0), scale)),
                                       Instance("room", 1, build.transform((0, 0, 0), scale))))
     assert solid(scene).tolist() == [True] * 12 + [False] * 12
+
+
+def test_a_face_without_area_does_not_open_a_solid():
+    cube = build.cube()
+    repeated = build.mesh("cube", np.concatenate([cube.vertices_local, cube.vertices_local[:1]]),
+                          np.concatenate([cube.triangles, [[0, 8, 1], [2, 2, 5]]]))
+    label, closed = closed_components(repeated)
+    assert closed[label[:12]].all()
+    label, closed = closed_components(without(repeated, 3))
+    assert not closed[label[:11]].any()

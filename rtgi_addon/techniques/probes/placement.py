@@ -27,8 +27,8 @@ MAX_OFFSET = 0.45
 CLEARANCE = 0.05
 # Surfaces meet in corners: a probe is moved away from this many, one after the other.
 MOST_WALLS = 3
-# Surfaces count as near up to this many clearances along a ray: any plane nearer than one is met by a pilot ray that soon.
-NEAR_ALONG_RAY = 2.0
+# Surfaces count as near up to this many clearances along a ray: from just outside a corner no ray meets its walls sooner.
+NEAR_ALONG_RAY = 4.0
 
 
 @dataclass(eq=False)

@@ -1,0 +1,55 @@
+"""The stability suite from Blender and from the command line."""
+
+import json
+
+import pytest
+
+from rtgi_addon.blender.cli.base import Session
+from rtgi_addon.blender.cli.parser import SUBCOMMANDS, build_parser
+from rtgi_addon.errors import BakeError, UsageError
+from rtgi_addon.evaluate.stability import CASES, Case, Limit, Sample, limits
+from rtgi_addon.progress import Progress
+
+bpy = pytest.importorskip("bpy", reason="needs Blender's Python module")
+
+
+@pytest.fixture
+def registered(empty_blend, tmp_path):
+    import rtgi_addon
+    rtgi_addon.register()
+    bpy.context.scene.rtgi.output = str(tmp_path / "bake")
+    yield tmp_path / "bake_stability"
+    rtgi_addon.unregister()
+
+
+@pytest.fixture
+def made_up(monkeypatch):
+    """A case that finds 0.5 and bakes nothing."""
+    monkeypatch.setitem(limits.LIMITS, "made-up", {"rsm": Limit(0.6, "so it is")})
+    case = Case("made-up", "nothing", "none", "a number", "one", 0.2, lambda bench: [Sample("it", 0.5)])
+    monkeypatch.setitem(CASES, "made-up", case)
+
+
+def test_the_operator_leaves_a_report_in_blender_and_on_disk(registered, made_up):
+    assert bpy.ops.rtgi.stability(technique="rsm", case="made-up") == {"FINISHED"}
+    assert "made-up" in bpy.data.texts["RTGI Stability"].as_string()
+    assert json.loads((registered / "stability.json").read_text())["cases"][0]["verdict"] == "known weakness"
+
+
+def test_the_operator_reports_an_unknown_case(registered):
+    with pytest.raises(RuntimeError, match="no-such"):
+        bpy.ops.rtgi.stability(technique="rsm", case="no-such")
+
+
+def test_the_shell_fails_where_a_bound_is_passed(made_up, monkeypatch):
+    def run(*words):
+        arguments = build_parser("rtgi").parse_args(["stability", *words])
+        SUBCOMMANDS["stability"].check(arguments)
+        return SUBCOMMANDS["stability"].run(arguments, Session(Progress(), lambda: None))
+
+    assert run("--case", "made-up").to_json()["cases"][0]["figure"] == 0.5
+    monkeypatch.setitem(limits.LIMITS, "made-up", {"rsm": Limit(0.4, "so it is")})
+    with pytest.raises(BakeError, match=r"made-up of rsm \(0.5, bound 0.4\).*--case made-up --technique rsm"):
+        run("--case", "made-up")
+    with pytest.raises(UsageError, match="no-such"):
+        run("--technique", "no-such")

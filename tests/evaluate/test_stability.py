@@ -1,0 +1,148 @@
+"""The stability suite: its figures within the stored bounds, remedies that help, the report, and the commands that show a failure.
+
+Every figure is the same for the same seed, so no test here is left to luck. The bounds of techniques that sample at random lie at
+least five standard deviations, over bakes with several seeds, above the mean figure: a change that only draws other numbers passes
+with a confidence of more than 99.9 %, also over all figures together.
+"""
+
+import json
+
+import numpy as np
+import pytest
+
+from rtgi_addon.errors import Cancelled, UsageError
+from rtgi_addon.evaluate import stability
+from rtgi_addon.evaluate.stability import CASES, HOLDS, WEAK, WORSE, Case, Limit, Result, Sample, Variant, limits, parts, suite
+from rtgi_addon.evaluate.stability.motion import flicker
+from rtgi_addon.jobs.stability import run_stability
+from rtgi_addon.progress import Progress
+from rtgi_addon.techniques import names
+
+# What takes about a second; the others are marked slow.
+FAST = {
+    "wall-thickness": ("vpl", "rsm", "lpv"), "leak-feedback": ("lpv",), "baffle": ("probes", "vpl", "rsm", "lpv"),
+    "lattice-on-walls": ("lpv",), "degenerate-mesh": ("rsm",), "refusal": ("probes", "vpl", "rsm", "lpv"), "scale": ("rsm",),
+    "edge-bias": ("rsm",), "near-one-albedo": ("rsm", "lpv"), "lone-plate": ("probes", "vpl", "rsm", "lpv"),
+    "spreading": ("probes", "vpl", "rsm", "lpv"), "resolution": ("probes", "vpl", "rsm"), "step-size": ("rsm", "lpv"),
+    "fireflies": ("rsm",),
+}
+FIGURES = [pytest.param(case.name, technique, marks=() if technique in FAST.get(case.name, ()) else pytest.mark.slow)
+           for case, technique in stability.chosen()]
+# Remedies that must at least halve the figure: (case, technique, what is left out instead).
+REMEDIES = [("wall-thickness", "probes", "plain trilinear"), ("wall-thickness", "lpv", "without blocking"),
+            ("lattice-on-walls", "probes", "without virtual offset"), ("probe-in-geometry", "probes", "without virtual offset"),
+            ("fireflies", "vpl", "bound at the mean irradiance"), ("fireflies", "vpl", "no clamp"),
+            ("light-motion", "vpl", "virtual lights sampled anew each frame")]
+
+
+@pytest.mark.parametrize(("name", "technique"), FIGURES)
+def test_figures_stay_within_their_bounds(name, technique):
+    result = stability.measure(CASES[name], technique)
+    assert result.verdict != WORSE, (f"{name} of {technique} is {result.figure:.4g} at {result.worst.parameter}, and its bound is "
+                                     f"{result.limit.bound:g}; see it with: {result.command}")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "technique", "without"), REMEDIES)
+def test_remedies_halve_a_failure(name, technique, without):
+    case = CASES[name]
+    (variant,) = (variant for variant in case.variants[technique] if variant.name == without)
+    before, after = stability.measure(case, technique, variant), stability.measure(case, technique)
+    assert after.figure < 0.5 * before.figure, (before.figure, after.figure, after.command)
+
+
+def test_shadow_rays_keep_reflective_shadow_maps_behind_the_wall():
+    case = CASES["baffle"]
+    (variant,) = (variant for variant in case.variants["rsm"] if variant.remedy)
+    assert stability.measure(case, "rsm", variant).figure == 0.0
+    assert stability.measure(case, "rsm").verdict == WEAK
+
+
+def test_every_technique_is_in_the_suite_and_every_weakness_has_a_reason():
+    assert {technique for case in CASES.values() for technique in case.limits} == set(names())
+    assert set(limits.LIMITS) == set(CASES)
+    for case in CASES.values():
+        assert set(case.variants) <= set(case.limits)
+        for technique, limit in case.limits.items():
+            assert np.isfinite(limit.bound) and (limit.bound <= case.goal or limit.why), (case.name, technique)
+
+
+def test_steady_motion_is_no_flicker():
+    time = np.arange(6.0)[:, None]
+    assert flicker(2.0 + time * np.array([[0.1, -0.2, 0.0]])) < 1e-12
+    rng = np.random.default_rng(3)
+    # 6 frames of 4,000 points: the estimate's own error is 0.6 %, the bound five times that.
+    assert flicker(1.0 + 0.1 * rng.standard_normal((6, 4000))) == pytest.approx(0.1, rel=0.03)
+
+
+def test_receivers_lie_on_the_walls_and_face_inward():
+    points, normals = parts.receivers((-1, -2, 0), (1, 2, 3), 3)
+    middle = np.array([0.0, 0.0, 1.5])
+    assert points.shape == (54, 3) and np.all(np.einsum("ij,ij->i", middle - points, normals) > 0)
+    on_wall = np.isclose(points, [-1, -2, 0]) | np.isclose(points, [1, 2, 3])
+    assert np.all(on_wall.sum(axis=1) == 1)
+
+
+@pytest.fixture
+def made_up(monkeypatch):
+    """A case that measures nothing: 0.1 for probes, 0.5 for rsm and infinity for lpv; a variant has 0.9."""
+    def measure(bench):
+        value = 0.9 if bench.settings else {"probes": 0.1, "rsm": 0.5, "lpv": np.inf}[bench.technique]
+        return [Sample("first", 0.0), Sample("second", value)]
+
+    case = Case("made-up", "nothing fails", "no scene", "a number", "two steps", 0.2, measure,
+                {"probes": (Variant("left out", {"rays": 64}),)})
+    monkeypatch.setitem(limits.LIMITS, "made-up", {"probes": Limit(0.2), "rsm": Limit(0.6, "it is like that"), "lpv": Limit(1.0)})
+    monkeypatch.setitem(suite.CASES, "made-up", case)
+    return case
+
+
+def test_verdicts(made_up):
+    found = [stability.measure(made_up, technique).verdict for technique in ("probes", "rsm", "lpv")]
+    assert found == [HOLDS, WEAK, WORSE]
+    assert Result(made_up, "probes", (Sample("only", float("nan")),), 0.0).verdict == WORSE
+    assert stability.measure(made_up, "rsm").worst.parameter == "second"
+
+
+def test_the_report_names_figures_reasons_and_commands(made_up, tmp_path):
+    report = run_stability(tmp_path / "out", cases=["made-up"])
+    text, data = (tmp_path / "out/stability.md").read_text(), json.loads((tmp_path / "out/stability.json").read_text())
+    for words in ("made-up", "it is like that", "| lpv | infinite | 1 | worse", "| probes | instead: left out | 0.9 | 0.1 |",
+                  "stability --case made-up --technique rsm"):
+        assert words in text, words
+    assert [entry["verdict"] for entry in data["cases"]] == [HOLDS, WEAK, WORSE]
+    assert data["cases"][2]["figure"] is None and data["cases"][0]["samples"][1] == {"parameter": "second", "value": 0.1}
+    assert data["variants"][0]["figure"] == 0.9 and data["complete"]
+    assert [result.technique for result in report.worse] == ["lpv"] and "1 worse" in report.to_text()
+
+
+def test_a_cancelled_run_keeps_what_was_measured(made_up, tmp_path):
+    progress = Progress()
+    measure = made_up.measure
+
+    def measure_and_cancel(bench):
+        if bench.technique == "rsm":
+            progress.cancel()
+        return measure(bench)
+
+    object.__setattr__(made_up, "measure", measure_and_cancel)
+    with pytest.raises(Cancelled, match="what was measured is in"):
+        run_stability(tmp_path, cases=["made-up"], variants=False, progress=progress)
+    data = json.loads((tmp_path / "stability.json").read_text())
+    assert not data["complete"] and [entry["technique"] for entry in data["cases"]] == ["probes", "rsm"]
+
+
+def test_the_worst_case_is_drawn(tmp_path):
+    report = run_stability(tmp_path, cases=["baffle"], techniques=["lpv"], variants=False)
+    assert report.pictures == {("baffle", "lpv"): "pictures/baffle-lpv.png"}
+    picture = tmp_path / "pictures/baffle-lpv.png"
+    assert picture.read_bytes().startswith(b"\x89PNG") and picture.stat().st_size > 2000
+    assert "](pictures/baffle-lpv.png)" in (tmp_path / "stability.md").read_text()
+
+
+@pytest.mark.parametrize(("cases", "techniques", "word"), [
+    (["no-such"], None, "no-such"), (None, ["no-such"], "no-such"), (["camera-dolly"], ["probes"], "camera-dolly")])
+def test_unknown_names_are_refused_before_anything_is_measured(tmp_path, cases, techniques, word):
+    with pytest.raises(UsageError, match=word):
+        run_stability(tmp_path / "out", cases=cases, techniques=techniques)
+    assert not (tmp_path / "out").exists()
