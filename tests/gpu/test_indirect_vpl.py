@@ -95,6 +95,15 @@ def test_a_part_of_the_lights_has_the_same_mean(indirect):
     assert found.mean() == pytest.approx(expected.mean(), rel=0.02)
 
 
+def test_a_compensated_bound_is_not_taken_without_compensation(indirect):
+    from rtgi_addon.preview.indirect.base import irradiance
+    field = bake(BOX, lights=2000, compensation=True)
+    assert field.uncompensated_clamp > 2.0 * field.clamp
+    points, normals = on_surfaces(field.context, 2000)
+    found = irradiance(indirect.make_indirect(field, BOX), points, normals)
+    assert found.mean() == pytest.approx(field.irradiance(points, normals).mean(), rel=0.03)
+
+
 def test_lights_follow_a_moved_lamp(indirect):
     field = bake(BOX)
     moved = replace(BOX, lights=(build.point_light((-0.5, 0.4, 0.0)),))

@@ -1,7 +1,8 @@
 """Tables of virtual lights for include/irradiance_vpl.glsl: techniques/vpl/gather.py, ``gather``, with stored visibility.
 
-Short rays are not for a shader: what the bound on the geometry term takes away is not compensated, so corners are darker than the
-field has them (its ``stats`` say by how much on the whole). Light of lamps themselves is left out of it, even if the field has it.
+Short rays are not for a shader: what the bound on the geometry term takes away is not compensated. So the bound is the one that a
+bake without compensation has: corners are a little darker, and bright spots are left near edges. The light of lamps themselves is
+left out, even if the field has it.
 """
 
 import numpy as np
@@ -23,7 +24,7 @@ STRUCT = UniformStruct("VirtualLights", (
 def vpl_tables(field: VplField, samples: int | None = None, seen: SeenPlanes | None = None) -> Tables:
     """The virtual lights of ``field`` and what they see. With ``samples`` a receiver reads about so many of them, those of its own
     turn, for all. ``seen`` remembers for the next field what this one's lights see."""
-    lights, context = field.lights, field.context
+    lights, context, clamp = field.lights, field.context, field.uncompensated_clamp
     centre, radius = focus(context)
     total = lights.count + lights.distant_count
     stride = 1 if samples is None else max(1, -(-total // samples))
@@ -31,7 +32,7 @@ def vpl_tables(field: VplField, samples: int | None = None, seen: SeenPlanes | N
     for column, part in enumerate((lights.directions, lights.irradiance, *frame(lights.directions))):
         distant[:, 4 * column:4 * column + 3] = part
     values = {"focus": (*centre, radius), "count": lights.count, "distant_count": lights.distant_count, "stride": stride,
-              "clamp_at": np.float32(3e38) if field.clamp is None else field.clamp, "side": SIDE, "distant_side": DISTANT_SIDE,
+              "clamp_at": np.float32(3e38) if clamp is None else clamp, "side": SIDE, "distant_side": DISTANT_SIDE,
               "tolerance": TOLERANCE, "distant_tolerance": DISTANT_TOLERANCE * 2.0 * radius / DISTANT_SIDE,
               "self_intersection": SELF_INTERSECTION, "seed_state": int(hash_u32(0x76706C))}
     seen = seen or SeenPlanes()

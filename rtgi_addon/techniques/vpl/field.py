@@ -52,6 +52,11 @@ class VplField(Field):
                                               settings.bounces, seed)
         self._grids: tuple[ProbeGrid, ...] | None = None
 
+    @property
+    def uncompensated_clamp(self) -> float | None:
+        """The bound [m⁻²] for whoever gathers without giving back what it takes: a compensated one takes much more."""
+        return self.clamp if self._compensation is None else max(self.clamp, self._natural or 0.0)
+
     def irradiance(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """See Field. Every receiver casts a shadow ray to every virtual light that faces it."""
         points, normals = np.asarray(points, np.float32), np.asarray(normals, np.float32)
