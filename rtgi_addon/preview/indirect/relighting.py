@@ -3,7 +3,7 @@
 import threading
 from collections.abc import Callable
 
-from ...errors import BakeError, Cancelled
+from ...errors import Cancelled
 from ...progress import Progress
 from ...scene import Scene
 from ...techniques.base import Field
@@ -91,7 +91,7 @@ class RelitLight(FieldLight):
                 result = field, self._tables_of(field)
             except Cancelled:
                 result = None
-            except BakeError as error:
+            except Exception as error:  # it belongs to who asks with `update`
                 result = error
             with self._lock:
                 self._result = result
