@@ -166,15 +166,19 @@ def _coarse(bench: Bench) -> dict:
             "lpv": {"map_resolution": 64, "steps": 256}}[bench.technique]
 
 
+# The other ways to read the same probes: each is better for some light and worse for other.
+READINGS = tuple(Variant(f"read as {name}", {LOOKUP: {"reconstruction": name}}) for name in ("linear", "geomerics", "zh3"))
+
 CASES = (
     Case("near-one-albedo", "light lost or made where walls are bright", "an integrating sphere with a lamp off its centre",
          "deviation of the wall's mean irradiance from albedo/(1 - albedo) times the direct light", "the albedo", 0.02,
          _near_one_albedo),
     Case("emitter-size", "noise and bias as an emitter shrinks", "a room lit by a panel of constant power",
-         "relative RMSE on floor and walls against path tracing", "the panel's width", 0.1, _emitter_size),
+         "relative RMSE on floor and walls against path tracing", "the panel's width", 0.1, _emitter_size,
+         {"probes": READINGS}),
     Case("one-direction", "ringing and blur of light from one direction", "a black room with one small lit patch",
          "RMS error over all normals at a probe, over the patch's irradiance", "the SH order", 0.05, _one_direction,
-         {"probes": tuple(Variant(name, {LOOKUP: {"reconstruction": name}}) for name in ("linear", "geomerics", "zh3"))}),
+         {"probes": READINGS}),
     Case("negative-light", "negative light where an engine reads SH as they are", "a black room with one small lit patch",
          "the lowest irradiance below zero, over the patch's", "the SH order", 0.05, _negative_light),
     Case("fireflies", "bright spots near corners", "a room with a block",
@@ -185,7 +189,8 @@ CASES = (
          "irradiance on the plate over its radiosity; the truth is 0", "how it leans", 0.01, _lone_plate,
          {"lpv": (Variant("without damping", {"dampening": False}),)}),
     Case("spreading", "light spreads as it travels", "a lit spot on the floor of a black room",
-         "relative RMSE on the walls against path tracing", "height above the floor", 0.1, _spreading),
+         "relative RMSE on the walls against path tracing", "height above the floor", 0.1, _spreading,
+         {"probes": READINGS}),
     Case("resolution", "brightness that depends on resolution", "a room with a block",
          "deviation of the walls' mean irradiance from the finest's", "texels, virtual lights, map texels or cells", 0.03,
          _sweep("resolution")),

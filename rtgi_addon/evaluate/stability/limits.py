@@ -31,7 +31,7 @@ LIMITS: dict[str, dict[str, Limit]] = {
         "lpv": Limit(0.18, "cells that a wall cuts count to either side")},
     "grazing-corner": {
         "probes": Limit(0.62, "the partition's end lies between probes of both sides, and its dark side is very dark"),
-        "vpl": Limit(1.2, "few virtual lights reach the dark side, and each of them is seen"), "rsm": Limit(21.0, _UNSEEN),
+        "vpl": Limit(1.3, "few virtual lights reach the dark side, and each of them is seen"), "rsm": Limit(21.0, _UNSEEN),
         "lpv": Limit(3.2, _SPREAD)},
     "edge-bias": {"probes": Limit(0.14, _CELL), "vpl": Limit(0.25, _NOISE),
                   "rsm": Limit(0.36, "texels beside an edge count as disks, which reach through it"), "lpv": Limit(0.58, _SPREAD)},
@@ -41,7 +41,7 @@ LIMITS: dict[str, dict[str, Limit]] = {
     "lattice-on-walls": {"probes": Limit(0.05),
                          "lpv": Limit(0.16, "a wider volume makes wider cells: 16 of them over whatever it covers")},
     "refusal": {"probes": Limit(0.0), "vpl": Limit(0.0), "rsm": Limit(0.0), "lpv": Limit(0.0)},
-    "scale": {"probes": Limit(0.001), "vpl": Limit(0.07, _NOISE),
+    "scale": {"probes": Limit(0.001), "vpl": Limit(0.16, _NOISE),
               "rsm": Limit(0.06, "the noise of 400 samples, of which rounding draws others"), "lpv": Limit(0.002)},
     "near-one-albedo": {"probes": Limit(0.01), "vpl": Limit(0.09, _NOISE), "rsm": Limit(0.01),
                         "lpv": Limit(0.95, "a round wall of cells has seams that let out what is reflected often")},

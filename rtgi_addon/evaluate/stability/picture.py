@@ -29,7 +29,7 @@ def draw_result(result: Result, path) -> Path | None:
         return None
     worst = max(drawn, key=lambda sample: sample.value if np.isfinite(sample.value) else np.inf)
     best = min(drawn, key=lambda sample: sample.value if np.isfinite(sample.value) else np.inf)
-    halves = [_light(sample) for sample in ((worst, best) if worst is not best else (worst,))]
+    halves = [_light(sample) for sample in ((worst, best) if worst.field is not best.field else (worst,))]
     lit = luminance(halves[-1][np.isfinite(halves[-1][..., 0])])
     exposure = BRIGHTNESS / max(float(np.quantile(lit, EXPOSED)) if lit.size else 0.0, 1e-30)
     shown = [np.where(np.isfinite(half), half * exposure, BACKDROP) for half in halves]
