@@ -54,6 +54,8 @@ class RTGI_OT_chart(bpy.types.Operator):
                                   min=8, max=4096)
     noise: bpy.props.FloatProperty(name="Reference Noise", description="Relative noise at which the reference stops", default=0.01,
                                    min=0.001, max=0.2, precision=3)
+    maps: bpy.props.BoolProperty(name="Error Maps", description="Also draw where in the scene each technique is wrong",
+                                  default=True)
     reference: bpy.props.EnumProperty(name="Reference", description="What is held to be right", items=[
         ("path", "Path Tracer", "This add-on's own path tracer"),
         ("cycles", "Cycles", "Cycles, on the CPU; Blender waits while it renders")])
@@ -125,7 +127,7 @@ class RTGI_OT_chart(bpy.types.Operator):
             self.report({"ERROR"}, str(error))
             return None
         folder, name = charts.folder, scene.name
-        options = {"seeds": self.seeds, "points": self.points, "noise": self.noise, "reference": reference}
+        options = {"seeds": self.seeds, "points": self.points, "noise": self.noise, "reference": reference, "maps": self.maps}
 
         def measure(progress: Progress):
             return chart_scene(extracted, folder, progress=progress, **options,

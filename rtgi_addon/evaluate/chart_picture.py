@@ -29,7 +29,7 @@ MARGIN, LEAST_SPAN = 1.6, 5.0
 def can_draw() -> bool:
     """Whether matplotlib is there."""
     try:
-        import matplotlib.figure  # noqa: F401
+        from matplotlib import figure  # noqa: F401
     except ImportError:
         return False
     return True
@@ -63,6 +63,8 @@ def draw_chart(chart: Chart, folder: Path) -> tuple[Path, Path]:
         figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False, fontsize=FONT - 0.5,
                       columnspacing=1.4, handletextpad=0.4, handlelength=1.6)
         figure.canvas.draw()
+        # Labels are placed on the layout as it is now.
+        figure.set_layout_engine("none")
         _place_labels(main, chart)
         png, svg = folder / "chart.png", folder / "chart.svg"
         figure.savefig(png, dpi=160)
@@ -102,6 +104,10 @@ def _draw_panel(axis, chart: Chart, cost: str, place: str, small: bool = False) 
     """One log-log panel: points with their intervals, those of a technique joined in the order of their cost, and the front."""
     factor = {"peak_bytes": 1 / MEBIBYTE, "rays": 1e-6}.get(cost, 1.0)
     known = [point for point in chart.points if point.cost(cost)]
+    if not known:
+        axis.text(0.5, 0.5, "not measured", transform=axis.transAxes, ha="center", va="center", color=FAINT_INK)
+        axis.set(xticks=[], yticks=[])
+        return
     axis.set(xscale="log", yscale="log")
     for name in chart.techniques():
         points = sorted((point for point in known if point.technique == name), key=lambda point: point.cost(cost))
@@ -129,14 +135,13 @@ def _draw_panel(axis, chart: Chart, cost: str, place: str, small: bool = False) 
         x = [point.cost(cost) * factor for point in front]
         y = [_shown_error(point, place) for point in front]
         axis.step(x, y, where="post", color=INK, linewidth=1.2 if small else 1.6, zorder=1.5, alpha=0.8)
-    if known:
-        _finish_axes(axis, chart, cost, place, np.array([point.cost(cost) * factor for point in known]),
-                     np.array([_shown_error(point, place) for point in known]))
+    _finish_axes(axis, chart, cost, place, np.array([point.cost(cost) * factor for point in known]),
+                 np.array([_shown_error(point, place) for point in known]))
 
 
 def _finish_axes(axis, chart: Chart, cost: str, place: str, x: np.ndarray, y: np.ndarray) -> None:
     """Scales, ticks and labels about the points ``x``, ``y`` (n,)."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
     axis.set_xlabel({"seconds": "bake [s]", "rays": "rays [million]", "peak_bytes": "peak memory of the bake [MiB]"}[cost])
     axis.set_ylabel("relative RMSE [%]")
@@ -154,9 +159,8 @@ def _finish_axes(axis, chart: Chart, cost: str, place: str, x: np.ndarray, y: np
         decades = np.log10(ends[1] / ends[0])
         part.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if decades < 2.2 else (1.0,) if decades > 3.5 else (1.0, 3.0)))
         part.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        part.set_minor_formatter(NullFormatter())
+        part.set_minor_locator(NullLocator())
     axis.grid(True, which="major", color="#dddddd", linewidth=0.6, zorder=0)
-    axis.tick_params(which="minor", length=0)
     axis.set_axisbelow(True)
     for side in ("top", "right"):
         axis.spines[side].set_visible(False)
@@ -166,6 +170,7 @@ def _place_labels(axis, chart: Chart) -> None:
     """Label every point of the main panel where its label overlaps neither a point nor another label; leave out those that find no
     place, front and defaults first."""
     from matplotlib.patheffects import withStroke
+    from matplotlib.text import Text
     from matplotlib.transforms import Bbox
 
     renderer = axis.figure.canvas.get_renderer()
@@ -183,7 +188,9 @@ def _place_labels(axis, chart: Chart) -> None:
                                  color=_look(chart, point.technique)[0], zorder=5,
                                  path_effects=[withStroke(linewidth=2, foreground="white")],
                                  arrowprops={"arrowstyle": "-", "color": FAINT_INK, "linewidth": 0.4} if abs(dy) > 10 else None)
-            box = text.get_window_extent(renderer)
+            # Of the words alone: an annotation counts the line to its point as well.
+            text.update_positions(renderer)
+            box = Text.get_window_extent(text, renderer).padded(1.5 * pixels)
             clear = not any(other.overlaps(box) for number, other in enumerate(taken) if number != index)
             if clear and frame.x0 <= box.x0 and box.x1 <= frame.x1 and frame.y0 <= box.y0 and box.y1 <= frame.y1:
                 taken.append(box)

@@ -139,5 +139,6 @@ def _range(value: Interval, text) -> str:
 
 
 def _signed(value: Interval) -> str:
-    half = "" if value.low is None else f" ± {50 * (value.high - value.low):.2g}"
+    half = None if value.low is None else 50 * (value.high - value.low)
+    half = "" if half is None or half < 0.005 else f" ± {half:.2g}"
     return f"{100 * value.mean:+.2g}{half} %"

@@ -130,9 +130,10 @@ class _Survey:
                     span.step(0.0, f"{method.label}, setting {number + 1} of {len(method.sweep())}, seed {seed + 1}")
                     if not self._measure(key, method, settings, seed, span):
                         continue
-                    _write_json(self.chart(complete=False), folder)
+                    chart = self.chart(complete=False)
+                    _write_json(chart, folder)
                     if on_point is not None:
-                        on_point(self.chart(complete=False))
+                        on_point(chart)
 
     def chart(self, complete: bool = True) -> Chart:
         """All that was measured so far."""
