@@ -58,7 +58,7 @@ class ProbeField(Field):
     def irradiance(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """Irradiance (n, 3) float32 [W·m⁻²] at ``points`` (n, 3) with unit ``normals`` (n, 3), world space; never negative."""
         points, normals = np.asarray(points), np.asarray(normals)
-        share = self._shares(points)
+        share = self.shares(points)
         total = np.zeros((len(points), 3), np.float32)
         for lookup, weight in zip(self.lookups, share.T, strict=True):
             inside = np.flatnonzero(weight)
@@ -99,7 +99,7 @@ class ProbeField(Field):
         """One per grid, finest cells first; made on the first question, since a bake that only writes its grids asks none."""
         return tuple(sorted((GridLookup(grid, self.lookup) for grid in self._grids), key=lambda lookup: lookup.cell_volume))
 
-    def _shares(self, points: np.ndarray) -> np.ndarray:
+    def shares(self, points: np.ndarray) -> np.ndarray:
         """Share (n, volumes) float32 of each lookup in each point; rows sum to 1."""
         share = np.zeros((len(points), len(self.lookups)), np.float32)
         left = np.ones(len(points), np.float32)
