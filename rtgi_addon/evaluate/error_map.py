@@ -21,8 +21,8 @@ from .view import choose_view
 
 # The error [share] that the strongest colour stands for, and the share of the mean below which surfaces count as equally dark.
 FULL_SCALE, FAINT = 0.5, 0.1
-# Noise of the reference behind a map, and the most paths a pixel.
-NOISE, MOST_PATHS = 0.05, 768
+# Noise of the reference behind a map, and the most paths of all its pixels together.
+NOISE, MOST_PATHS = 0.05, 1 << 22
 BACKDROP = np.float32([0.25, 0.25, 0.25])
 SHADED = 0.12
 # ColorBrewer RdBu, from dark blue to dark red, sRGB.

@@ -16,8 +16,9 @@ from ..transport.context import LightContext
 from ..transport.path import Estimate, irradiance_at, probe_sh
 from .receivers import Receivers
 
-# Paths a point of the first round, from whose noise the number of all paths follows, and the most that are traced.
-PILOT_PATHS, MOST_PATHS = 512, 1 << 16
+# Paths a point of the first round, from whose noise the number of all paths follows, and the most paths of all points together:
+# about a minute on two cores.
+PILOT_PATHS, MOST_PATHS = 512, 1 << 23
 
 
 class Truth(NamedTuple):
@@ -46,7 +47,8 @@ class Reference(Protocol):
 
 
 class PathReference:
-    """The path tracer, with as many paths as bring its noise to ``noise`` (relative RMSE), and no more than ``most_paths`` a point.
+    """The path tracer, with as many paths as bring its noise to ``noise`` (relative RMSE), and no more than ``most_paths`` for all
+    points together.
 
     The same scene, receivers and seed give the same numbers for any number of threads.
     """
@@ -64,20 +66,21 @@ class PathReference:
         def trace(paths, seed, part):
             return irradiance_at(context, receivers.points, receivers.normals, paths, bounces=bounces, seed=seed, progress=part)
 
-        return self._refined(trace, progress or Progress())
+        return self._refined(trace, len(receivers.points), progress or Progress())
 
     def probes(self, points: np.ndarray, order: int, progress: Progress | None = None) -> Truth:
         """See Reference."""
         def trace(paths, seed, part):
             return probe_sh(self.context, points, order, paths, seed=seed, progress=part)
 
-        return self._refined(trace, progress or Progress())
+        return self._refined(trace, len(points), progress or Progress())
 
-    def _refined(self, trace, progress: Progress) -> Truth:
-        pilot_paths = min(PILOT_PATHS, self.most_paths)
+    def _refined(self, trace, points: int, progress: Progress) -> Truth:
+        most = max(self.most_paths // max(points, 1), 1)
+        pilot_paths = min(PILOT_PATHS, most)
         pilot = _truth(trace(pilot_paths, self.seed, progress.span(0.0, 0.1)))
         missing = pilot_paths * ((pilot.noise / self.noise) ** 2 - 1.0)
-        paths = int(min(missing, self.most_paths - pilot_paths))
+        paths = int(min(missing, most - pilot_paths))
         if paths <= 0:
             return pilot
         rest = _truth(trace(paths, self.seed + 1, progress.span(0.1, 1.0)))

@@ -28,20 +28,20 @@ def test_more_paths_are_traced_for_less_noise():
     scene = build.closed_box(albedo=0.5, light_position=(0.5, 0.3, 0.2))
     noise = []
     for target in (0.2, 0.006):
-        reference, receivers = reference_in(scene, target, most_paths=1 << 14)
+        reference, receivers = reference_in(scene, target, most_paths=1 << 20)
         noise.append(reference.irradiance(receivers).noise)
     assert noise[1] < 0.6 * noise[0] and noise[1] < 0.009
 
 
 def test_no_more_paths_than_allowed():
     counted = []
-    reference, _ = reference_in(build.closed_box(), 1e-6, most_paths=2048)
+    reference, _ = reference_in(build.closed_box(), 1e-6, most_paths=4 * 2048)
 
     def trace(paths, seed, progress):
         counted.append(paths)
         return Estimate(np.ones((4, 3), np.float32), np.full((4, 3), 0.1, np.float32))
 
-    truth = reference._refined(trace, Progress())
+    truth = reference._refined(trace, 4, Progress())
     assert counted == [512, 1536]
     # Two independent means of variance 0.01, weighted by paths: ¼² + ¾² of it.
     assert truth.variance == pytest.approx(0.01 * (1 / 16 + 9 / 16))
