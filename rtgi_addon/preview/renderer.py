@@ -74,6 +74,11 @@ class PreviewRenderer:
         """Every pass as RGBA32F, scene-linear, row 0 at the bottom; empty before the first frame."""
         return {} if self._film is None else self._film.textures
 
+    @property
+    def gbuffer(self) -> dict[str, gpu.types.GPUTexture]:
+        """The surfaces of the latest sample (gbuffer.GBuffer.textures); empty before the first frame."""
+        return {} if self._gbuffer is None else self._gbuffer.textures
+
     def image(self, name: str) -> np.ndarray:
         """A pass as (h, w, 4) float32, row 0 at the bottom."""
         return download(self.textures[name])

@@ -20,3 +20,16 @@ class PreviewSettings:
     shadow_views: int = setting(64, "Shadow Views", "Shadow maps drawn a frame; where lamps need more, every frame has its "
                                 "share of them", "", 8, 4096)
     film_transparent: bool = setting(False, "Transparent", "Leave the world out of the picture; it still lights the scene")
+
+
+@dataclass(frozen=True)
+class OverlaySettings:
+    """What is drawn over the picture."""
+
+    probes: str = setting("none", "Probes", "Spheres where the probes are: in the light that they hold, or coloured by whether "
+                                            "they are usable (green), moved (orange) or inside geometry (red)",
+                          choices=("none", "light", "validity"))
+    probe_size: float = setting(1.0, "Probe Size", "How large the spheres of probes are", "", 0.1, 5.0)
+    bounds: bool = setting(False, "Volume Bounds", "The boxes of the probe volumes")
+    leaks: bool = setting(False, "Leaks", "Colours on surfaces for how far the light is off there: red is too bright, blue is too "
+                                          "dark; what was measured last with Find Leaks")
