@@ -28,11 +28,12 @@ FAST = {
 }
 FIGURES = [pytest.param(case.name, technique, marks=() if technique in FAST.get(case.name, ()) else pytest.mark.slow)
            for case, technique in stability.chosen()]
-# Remedies that must at least halve the figure: (case, technique, what is left out instead).
-REMEDIES = [("wall-thickness", "probes", "plain trilinear"), ("wall-thickness", "lpv", "without blocking"),
-            ("lattice-on-walls", "probes", "without virtual offset"), ("probe-in-geometry", "probes", "without virtual offset"),
-            ("fireflies", "vpl", "bound at the mean irradiance"), ("fireflies", "vpl", "no clamp"),
-            ("light-motion", "vpl", "virtual lights sampled anew each frame")]
+# Remedies, and to what share of it they must bring the figure: (case, technique, what is left out instead, share).
+REMEDIES = [("wall-thickness", "probes", "plain trilinear", 0.01), ("wall-thickness", "lpv", "without blocking", 0.05),
+            ("lattice-on-walls", "probes", "without virtual offset", 0.1),
+            ("probe-in-geometry", "probes", "without virtual offset", 0.5),
+            ("fireflies", "vpl", "bound at the mean irradiance", 0.5), ("fireflies", "vpl", "no clamp", 0.2),
+            ("light-motion", "vpl", "virtual lights sampled anew each frame", 0.8)]
 
 
 @pytest.mark.parametrize(("name", "technique"), FIGURES)
@@ -43,12 +44,12 @@ def test_figures_stay_within_their_bounds(name, technique):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "technique", "without"), REMEDIES)
-def test_remedies_halve_a_failure(name, technique, without):
+@pytest.mark.parametrize(("name", "technique", "without", "share"), REMEDIES)
+def test_remedies_help(name, technique, without, share):
     case = CASES[name]
     (variant,) = (variant for variant in case.variants[technique] if variant.name == without)
-    before, after = stability.measure(case, technique, variant), stability.measure(case, technique)
-    assert after.figure < 0.5 * before.figure, (before.figure, after.figure, after.command)
+    before, after = stability.measure(case, technique, variant).figure, stability.measure(case, technique).figure
+    assert after < share * before
 
 
 def test_shadow_rays_keep_reflective_shadow_maps_behind_the_wall():
