@@ -11,9 +11,9 @@ the distance between lights; with one, corners are too dark unless compensated. 
 many distant lights. Glossy reflection is treated as diffuse of the same albedo.
 
 Measured with 4,096 lights at surface points of the samples, against the path reference (benchmarks/vpl.py): relative RMSE 3 to
-7 %, which a few bright spots make, 1 to 5 % at the middle receiver, bias within 3.2 % in sun_window and 1.6 % elsewhere; light in
-the dark one of two_rooms: none. SH of probes: 4 to 9 %, with many lamps 25 %; the error falls somewhat faster than the square root
-of the number of lights.
+7 % (cornell_box, sun_window, two_rooms), 1 to 5 % at the middle receiver, bias within 3.2 % in sun_window and 1.6 % elsewhere;
+light in the dark one of two_rooms: none. SH of probes: 4 to 9 %, with many lamps 25 %; the error falls somewhat faster than the
+square root of the number of lights.
 """
 
 import numpy as np
