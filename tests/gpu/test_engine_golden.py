@@ -1,6 +1,6 @@
 """F12 of the Cornell box against a picture that was looked at, pixel by pixel within its noise.
 
-The golden (tests/references/f12_cornell_box.npz) holds the mean of many samples and the variance of a mean of 16. After a change
+The golden (tests/goldens/f12_cornell_box.npz) holds the mean of many samples and the variance of a mean of 16. After a change
 of the picture that is meant, `python tests/gpu/test_engine_golden.py` writes it again.
 """
 
@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
-GOLDEN = ROOT / "tests/references/f12_cornell_box.npz"
+GOLDEN = ROOT / "tests/goldens/f12_cornell_box.npz"
 SIZE, SAMPLES, GROUPS = 48, 16, 8
 UPDATE = "if the change is meant, run `python tests/gpu/test_engine_golden.py`"
 # Drivers rasterize and filter with their own rounding.
