@@ -28,13 +28,17 @@ class Accuracy:
 
 @dataclass(frozen=True)
 class Point:
-    """One setting of one technique, measured with some seeds. ``label`` says what differs from the defaults; ``default`` is true
-    for the defaults themselves; ``accuracy`` is by place (measure.PLACES); ``runs`` are the single bakes as plain values."""
+    """One setting of one technique, measured with some seeds.
+
+    ``label`` says what differs from the defaults; ``default`` is true for the defaults themselves; ``lattice`` multiplies the
+    volumes' resolution; ``accuracy`` is by place (measure.PLACES); ``runs`` are the single bakes as plain values.
+    """
 
     technique: str
     technique_label: str
     label: str
     default: bool
+    lattice: float
     settings: dict
     seconds: Interval
     cpu_seconds: Interval
@@ -45,9 +49,9 @@ class Point:
     accuracy: dict[str, Accuracy]
     runs: tuple[dict, ...]
 
-    def error(self, place: str = "surface") -> float:
-        """Relative RMSE in ``place``, mean over seeds."""
-        return self.accuracy[place].spread.error.mean
+    def error(self, place: str = "surface") -> float | None:
+        """Relative RMSE in ``place``, mean over seeds; None where it was not measured."""
+        return self.accuracy[place].spread.error.mean if place in self.accuracy else None
 
     def cost(self, name: str) -> float | None:
         """One of COSTS, mean over seeds; None where it is not known."""
@@ -74,7 +78,7 @@ class Chart:
 
     def front(self, cost: str = "seconds", place: str = "surface") -> list[int]:
         """Indices of the points on the Pareto front of ``cost`` and error in ``place``, by rising cost."""
-        rows = [index for index, point in enumerate(self.points) if point.cost(cost) is not None]
+        rows = [index for index, point in enumerate(self.points) if None not in (point.cost(cost), point.error(place))]
         found = pareto_front([self.points[row].cost(cost) for row in rows], [self.points[row].error(place) for row in rows])
         return [rows[index] for index in found]
 
@@ -90,10 +94,12 @@ class Chart:
 
 def point_of(yard: Yard, technique: Technique, runs: list[Run]) -> Point:
     """The figures of ``runs``: one setting of ``technique``, one run a seed."""
-    settings, default = runs[0].settings, technique.Settings()
+    settings, default, lattice = runs[0].settings, technique.Settings(), runs[0].lattice
+    label = setting_label(settings, default) if lattice == 1.0 else f"lattice × {lattice:g}"
     peaks = [run.costs.peak_bytes for run in runs]
     return Point(
-        technique.name, technique.label, setting_label(settings, default), settings == default, asdict(settings),
+        technique.name, technique.label, label, settings == default and lattice == 1.0, lattice,
+        asdict(settings),
         seconds=log_interval([run.costs.seconds for run in runs]),
         cpu_seconds=log_interval([run.costs.cpu_seconds for run in runs]),
         rays=interval([run.costs.rays for run in runs]), peak_bytes=None if None in peaks else interval(peaks),

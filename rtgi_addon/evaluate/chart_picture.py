@@ -101,9 +101,9 @@ def draw_error_sheet(path: Path, pictures: list[tuple[str, np.ndarray]]) -> Path
 
 
 def _draw_panel(axis, chart: Chart, cost: str, place: str, small: bool = False) -> None:
-    """One log-log panel: points with their intervals, those of a technique joined in the order of their cost, and the front."""
+    """One log-log panel: points with their intervals, a technique's on the scene's own lattice joined by cost, and the front."""
     factor = {"peak_bytes": 1 / MEBIBYTE, "rays": 1e-6}.get(cost, 1.0)
-    known = [point for point in chart.points if point.cost(cost)]
+    known = [point for point in chart.points if point.cost(cost) and place in point.accuracy]
     if not known:
         axis.text(0.5, 0.5, "not measured", transform=axis.transAxes, ha="center", va="center", color=FAINT_INK)
         axis.set(xticks=[], yticks=[])
@@ -116,7 +116,8 @@ def _draw_panel(axis, chart: Chart, cost: str, place: str, small: bool = False) 
         colour, marker = _look(chart, name)
         x = np.array([point.cost(cost) * factor for point in points])
         y = np.array([_shown_error(point, place) for point in points])
-        axis.plot(x, y, "-", color=colour, linewidth=0.8, alpha=0.45, zorder=2)
+        own = np.array([point.lattice == 1.0 for point in points])
+        axis.plot(x[own], y[own], "-", color=colour, linewidth=0.8, alpha=0.45, zorder=2)
         for values, intervals, direction in ((x, [getattr(point, cost) for point in points], "x"),
                                              (y, [point.accuracy[place].spread.error for point in points], "y")):
             scale = factor if direction == "x" else 100.0

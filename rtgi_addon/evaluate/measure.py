@@ -63,7 +63,7 @@ class Errors:
 class Run:
     """One bake: ``costs`` of everything `rtgi bake` does but writing, ``lookup_seconds`` for one receiver of the technique's own
     field (wall clock), ``field_bytes`` of what the field keeps, ``errors`` by place and ``estimates``, the arrays behind them;
-    ``baked`` is the field itself."""
+    ``lattice`` is the factor of the volumes' resolution; ``baked`` is the field itself."""
 
     technique: str
     settings: object
@@ -74,6 +74,7 @@ class Run:
     errors: dict[str, Errors]
     estimates: dict[str, np.ndarray] = field(repr=False)
     baked: Field | None = field(repr=False, default=None)
+    lattice: float = 1.0
 
 
 class Yard:
@@ -137,11 +138,15 @@ class Yard:
         brightness = self.truth.mean.sum(axis=1)
         return brightness < DARK * brightness.mean()
 
-    def measure(self, technique: Technique, settings, seed: int, progress: Progress | None = None, **options) -> Run:
-        """Bake with ``technique`` and compare. ``options`` go to its ``bake``. Raises BakeError, Cancelled."""
+    def measure(self, technique: Technique, settings, seed: int, progress: Progress | None = None, *, lattice: float = 1.0,
+                **options) -> Run:
+        """Bake with ``technique`` and compare. ``lattice`` multiplies the volumes' resolution; there are no errors at ``probes``
+        where that is not 1, since others are baked. ``options`` go to the technique's ``bake``. Raises BakeError, Cancelled."""
         progress = progress or Progress()
+        scene = self.scene if lattice == 1.0 else replace(self.scene, volumes=tuple(
+            replace(volume, resolution=scaled_resolution(volume.resolution, lattice)) for volume in self.scene.volumes))
         with metered() as costs:
-            baked = technique.bake(self.scene, settings, np.random.default_rng(seed), progress.span(0.0, 0.9),
+            baked = technique.bake(scene, settings, np.random.default_rng(seed), progress.span(0.0, 0.9),
                                    threads=self.threads, **options)
             grids = baked.grids()
         progress.step(0.9, "looking up receivers")
@@ -149,14 +154,15 @@ class Yard:
         surface = baked.irradiance(self.receivers.points, self.receivers.normals)
         lookup = (perf_counter() - started) / len(surface)
         probes = baked if isinstance(baked, ProbeField) else ProbeField(grids, includes_direct=baked.includes_direct)
-        coefficients = np.concatenate([grid.sh.reshape(-1, *grid.sh.shape[3:]) for grid in grids])[self.probe_rows]
         estimates = {"surface": surface, "own_normals": surface[self.receivers.own],
-                     "shipped": probes.irradiance(self.receivers.points, self.receivers.normals), "probes": coefficients}
+                     "shipped": probes.irradiance(self.receivers.points, self.receivers.normals)}
+        if lattice == 1.0:
+            estimates["probes"] = np.concatenate([grid.sh.reshape(-1, *grid.sh.shape[3:]) for grid in grids])[self.probe_rows]
         if technique.knows != KNOWN_LIGHT:
             estimates["known"] = surface
         errors = {place: self._errors(place, estimate, technique) for place, estimate in estimates.items()}
         return Run(technique.name, settings, seed, costs, lookup, sum(array.nbytes for array in baked.arrays().values()),
-                   errors, estimates, baked)
+                   errors, estimates, baked, lattice)
 
     def truth_for(self, place: str, estimate: np.ndarray, technique: Technique) -> Truth:
         """The reference that ``estimate`` in ``place`` (of PLACES) is held to, of its shape."""
@@ -194,3 +200,8 @@ class Yard:
                 truth = self.path_reference.irradiance(self.receivers, progress, what)
             self._truths[what] = truth
         return self._truths[what]
+
+
+def scaled_resolution(resolution: tuple[int, int, int], factor: float) -> tuple[int, int, int]:
+    """A lattice's resolution times ``factor``, one probe along each axis at least."""
+    return tuple(max(1, round(count * factor)) for count in resolution)

@@ -117,18 +117,18 @@ class _Survey:
 
     def run(self, progress: Progress, folder: Path, on_point) -> None:
         """Every setting with every seed, one seed after the other; chart.json is written after each bake."""
-        total = sum(len(method.sweep()) for method in self.methods) * self.seeds
+        total = sum(len(_sweep(method)) for method in self.methods) * self.seeds
         done = 0
         for seed in range(self.seeds):
             for method in self.methods:
-                for number, settings in enumerate(method.sweep()):
+                for number, (settings, lattice) in enumerate(_sweep(method)):
                     span = progress.span(done / total, (done + 1) / total)
                     done += 1
                     key = method.name, number
                     if not self._worth_while(key, seed):
                         continue
-                    span.step(0.0, f"{method.label}, setting {number + 1} of {len(method.sweep())}, seed {seed + 1}")
-                    if not self._measure(key, method, settings, seed, span):
+                    span.step(0.0, f"{method.label}, setting {number + 1} of {len(_sweep(method))}, seed {seed + 1}")
+                    if not self._measure(key, method, settings, lattice, seed, span):
                         continue
                     chart = self.chart(complete=False)
                     _write_json(chart, folder)
@@ -139,7 +139,7 @@ class _Survey:
         """All that was measured so far."""
         yard = self.yard
         points = tuple(point_of(yard, method, self.runs[method.name, number]) for method in self.methods
-                       for number in range(len(method.sweep())) if (method.name, number) in self.runs)
+                       for number in range(len(_sweep(method))) if (method.name, number) in self.runs)
         count, normals = len(yard.receivers.points), round(len(yard.receivers.points) / yard.receivers.own.sum())
         return Chart(
             yard.scene.name,
@@ -159,20 +159,28 @@ class _Survey:
             self.left_out.append(f"{name}, setting {number + 1}: a cheaper one took more than {self.most_seconds:g} s")
         return not dear
 
-    def _measure(self, key: tuple[str, int], method: Technique, settings, seed: int, progress: Progress) -> bool:
+    def _measure(self, key: tuple[str, int], method: Technique, settings, lattice: float, seed: int, progress: Progress) -> bool:
         """True if the bake was measured; a technique that cannot bake this scene is left out with the reason."""
         try:
             if seed == 0 and key[1] == 0:
                 # The first bake of a technique in a process also loads its code and makes its tables: that one is not counted.
                 self.yard.measure(method, settings, seed, progress.span(0.0, 0.5))
-            run = self.yard.measure(method, settings, seed, progress.span(0.5, 1.0))
+            run = self.yard.measure(method, settings, seed, progress.span(0.5, 1.0), lattice=lattice)
         except BakeError as error:
             self.left_out.append(f"{method.name}, setting {key[1] + 1}: {error}")
             return False
-        if seed == 0 and settings == method.Settings():
+        if seed == 0 and settings == method.Settings() and lattice == 1.0:
             self.defaults[method.name] = run
         self.runs.setdefault(key, []).append(replace(run, baked=None))
         return True
+
+
+def _sweep(method: Technique) -> list[tuple[object, float]]:
+    """What is measured of a technique: its settings on the scene's own lattices, its defaults on coarser ones before and on finer
+    ones after them."""
+    coarser, finer = (sorted(factor for factor in method.lattices if (factor > 1.0) == above) for above in (False, True))
+    return [*((method.Settings(), factor) for factor in coarser), *((settings, 1.0) for settings in method.sweep()),
+            *((method.Settings(), factor) for factor in finer)]
 
 
 def _maps(survey: _Survey, progress: Progress) -> dict[str, tuple[str, ErrorMap, np.ndarray]]:

@@ -135,7 +135,8 @@ class Technique(ABC):
 
     ``tolerance`` is the relative error of irradiance that it declares for scenes with a closed form, at default settings;
     ``knows`` names the light in its fields, of KNOWN_LIGHT; without "bounces" they hold the first bounce of it. ``devices`` says
-    where it can bake; one that knows "gpu" takes ``kernels`` in its ``bake`` (techniques/kernels.py).
+    where it can bake; one that knows "gpu" takes ``kernels`` in its ``bake`` (techniques/kernels.py). ``lattices`` are factors of
+    the volumes' resolution at which a chart measures its defaults as well, if its field lives on the lattice.
     """
 
     name: ClassVar[str]
@@ -145,6 +146,7 @@ class Technique(ABC):
     tolerance: ClassVar[float] = 0.02
     knows: ClassVar[frozenset[str]] = KNOWN_LIGHT
     devices: ClassVar[tuple[str, ...]] = ("cpu",)
+    lattices: ClassVar[tuple[float, ...]] = ()
 
     @abstractmethod
     def bake(self, scene: Scene, settings, rng: np.random.Generator, progress: Progress, *, threads: int | None = None,

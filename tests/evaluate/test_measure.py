@@ -6,7 +6,7 @@ import scene_builders as build
 
 from rtgi_addon import techniques
 from rtgi_addon.errors import BakeError
-from rtgi_addon.evaluate.measure import PLACES, Yard
+from rtgi_addon.evaluate.measure import PLACES, Yard, scaled_resolution
 from rtgi_addon.jobs.settings import build_settings
 
 
@@ -26,6 +26,14 @@ def test_probes_in_a_furnace_are_right_everywhere(yard):
         assert errors.energy == pytest.approx(1 + errors.bias) and errors.leak is None, place
     assert run.errors["shipped"] == run.errors["surface"]
     assert run.costs.rays >= run.baked.stats["rays"] and run.costs.seconds > 0 and run.field_bytes > 27 * 9 * 3 * 4
+
+
+def test_other_lattices(yard):
+    probes = techniques.get("probes")
+    run = yard.measure(probes, build_settings(probes, {"error": 0.05}), seed=0, lattice=2.0)
+    assert [grid.volume.resolution for grid in run.baked.grids()] == [(6, 6, 6)] and run.lattice == 2.0
+    assert set(run.errors) == {"surface", "own_normals", "shipped"} and run.errors["surface"].error < 0.05
+    assert scaled_resolution((5, 2, 1), 0.5) == (2, 1, 1) and yard.scene.volumes[0].resolution == (3, 3, 3)
 
 
 def test_a_technique_that_knows_less_is_held_to_both():

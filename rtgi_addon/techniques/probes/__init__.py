@@ -31,6 +31,7 @@ class Probes(Technique):
     label = "Irradiance Probes"
     description = "Spherical harmonics of incident light on a lattice, the form that engines read"
     Settings = ProbeSettings
+    lattices = (0.5, 2.0)
 
     def bake(self, scene: Scene, settings: ProbeSettings, rng: np.random.Generator, progress: Progress, *,
              threads: int | None = None, checkpoint: Checkpoint | None = None) -> Field:
