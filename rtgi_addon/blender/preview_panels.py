@@ -63,6 +63,48 @@ class RTGI_PT_preview_shadows(_OfOurEngine, bpy.types.Panel):
         layout.prop(preview, "shadow_views")
 
 
+class RTGI_PT_preview_overlays(_OfOurEngine, bpy.types.Panel):
+    """What is drawn over the picture."""
+
+    bl_label = "Overlays"
+    bl_parent_id = "RTGI_PT_preview"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        """Probes, bounds, leaks."""
+        layout, preview = self.layout, context.scene.rtgi_preview
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.prop(preview, "probes")
+        layout.prop(preview, "probe_size")
+        column = layout.column(heading="Show")
+        column.prop(preview, "bounds")
+        column.prop(preview, "leaks")
+        column.prop(preview, "overlays_in_renders")
+
+
+class RTGI_PT_preview_compare(_OfOurEngine, bpy.types.Panel):
+    """Two techniques side by side."""
+
+    bl_label = "Compare"
+    bl_parent_id = "RTGI_PT_preview"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        """The other technique and where the line is."""
+        layout, scene = self.layout, context.scene
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.prop(scene.rtgi_preview, "compare", text="Split the Viewport")
+        if not scene.rtgi_preview.compare:
+            return
+        layout.prop(scene.rtgi_preview, "compare_technique")
+        layout.prop(scene.rtgi_preview, "split")
+        other = shown_for(scene, scene.rtgi_preview.compare_technique)
+        if other.note:
+            draw_lines(layout, other.note, context.region.width, "INFO")
+
+
 class RTGI_PT_film(_OfOurEngine, bpy.types.Panel):
     """Blender's own switches for the film."""
 
@@ -104,12 +146,16 @@ def draw_header(self, context):
     row = self.layout.row(align=True)
     row.prop(scene.rtgi, "technique", text="")
     row.prop(scene.rtgi_preview, "mode", text="")
+    row.prop(scene.rtgi_preview, "compare", text="", icon="MOD_MIRROR")
+    if scene.rtgi_preview.compare:
+        row.prop(scene.rtgi_preview, "compare_technique", text="")
     shown = shown_for(scene)
     if shown.field is None or is_stale(scene, shown):
         row.operator("rtgi.bake", text="", icon="ERROR")
 
 
-_CLASSES = (RTGI_PT_preview, RTGI_PT_preview_shadows, RTGI_PT_film, RTGI_PT_passes)
+_CLASSES = (RTGI_PT_preview, RTGI_PT_preview_shadows, RTGI_PT_preview_overlays, RTGI_PT_preview_compare, RTGI_PT_film,
+            RTGI_PT_passes)
 
 
 def register() -> None:

@@ -5,12 +5,15 @@ from types import SimpleNamespace
 
 import bpy
 
-from ..preview.settings import PreviewSettings
+from ..preview.settings import OverlaySettings, PreviewSettings
+from ..techniques import registry
 from .properties import blender_property, read_value
+from .session import redraw
 
 # Blender has its own switch for it.
 _ELSEWHERE = {"film_transparent"}
 _SETTINGS = SimpleNamespace(name="preview", Settings=PreviewSettings)
+_OVERLAYS = SimpleNamespace(name="overlays", Settings=OverlaySettings)
 
 SHOWN = tuple(item for item in fields(PreviewSettings) if item.name not in _ELSEWHERE)
 
@@ -21,7 +24,23 @@ def _scene_group() -> type:
     annotations["render_samples"] = bpy.props.IntProperty(
         name="Render", description="Frames that are averaged for a render", default=int(samples.default), min=1,
         max=int(samples.metadata["maximum"]))
+    annotations.update({item.name: blender_property(_OVERLAYS, item) for item in fields(OverlaySettings)})
+    annotations["overlays_in_renders"] = bpy.props.BoolProperty(
+        name="In Renders", description="Draw the overlays over the combined pass of renders as well")
+    annotations["compare"] = bpy.props.BoolProperty(
+        name="Compare", description="Show another technique right of a line through the viewport", update=_redraw)
+    techniques = registry()
+    annotations["compare_technique"] = bpy.props.EnumProperty(
+        name="Other Technique", description="What is shown right of the line", update=_redraw,
+        items=[(name, technique.label, technique.description.rstrip(".")) for name, technique in techniques.items()])
+    annotations["split"] = bpy.props.FloatProperty(
+        name="Split", description="Where the line is, from the left edge of the viewport to the right", default=0.5, min=0.0,
+        max=1.0, subtype="FACTOR", update=_redraw)
     return type("RTGI_PG_preview", (bpy.types.PropertyGroup,), {"__annotations__": annotations})
+
+
+def _redraw(_self, _context) -> None:
+    redraw()
 
 
 class RTGI_PG_view_layer(bpy.types.PropertyGroup):
@@ -41,6 +60,12 @@ def preview_settings(scene: bpy.types.Scene, *, final: bool) -> PreviewSettings:
     if not final:
         return settings
     return replace(settings, samples=group.render_samples, resolution_scale=1.0, mode="combined")
+
+
+def overlay_settings(scene: bpy.types.Scene) -> OverlaySettings:
+    """What ``scene`` asks to be drawn over its pictures."""
+    group = scene.rtgi_preview
+    return OverlaySettings(**{item.name: read_value(_OVERLAYS, group, item.name) for item in fields(OverlaySettings)})
 
 
 def register() -> None:

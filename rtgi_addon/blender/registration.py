@@ -7,6 +7,7 @@ from . import (
     dependencies,
     engine,
     handlers,
+    leaks_ui,
     operators,
     panels,
     preview_panels,
@@ -20,7 +21,7 @@ _registered: list[ModuleType] = []
 
 def _modules() -> list[ModuleType]:
     """Everything, less what cannot be imported while required packages are missing: then the panels say what to install."""
-    modules = [properties, preview_settings, operators, panels, chart_ui, stability_ui, preview_panels, engine, handlers]
+    modules = [properties, preview_settings, operators, panels, chart_ui, stability_ui, leaks_ui, preview_panels, engine, handlers]
     if not dependencies.missing_required():
         from . import cli
 

@@ -5,6 +5,14 @@ vec4 texel(ivec2 at) {
 }
 
 void main() {
+  int column = int(gl_FragCoord.x);
+  if (column < region.span.x || column >= region.span.y) {
+    discard;
+  }
+  if (region.span.x > 0 && column < region.span.x + 2) {
+    color = vec4(1.0);
+    return;
+  }
   vec2 position = gl_FragCoord.xy / vec2(region.size) * vec2(textureSize(picture, 0)) - 0.5;
   ivec2 low = ivec2(floor(position));
   vec2 share = position - vec2(low);

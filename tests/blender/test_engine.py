@@ -164,15 +164,22 @@ def test_the_panels_and_the_header_can_be_drawn(scene):
     context = SimpleNamespace(scene=scene, engine="RTGI", region=SimpleNamespace(width=300), view_layer=scene.view_layers[0],
                               space_data=SimpleNamespace(shading=SimpleNamespace(type="RENDERED")))
     shown = []
-    for name in ("RTGI_PT_preview", "RTGI_PT_preview_shadows", "RTGI_PT_film", "RTGI_PT_passes"):
+    for name in ("RTGI_PT_preview", "RTGI_PT_preview_shadows", "RTGI_PT_preview_overlays", "RTGI_PT_preview_compare",
+                 "RTGI_PT_film", "RTGI_PT_passes"):
         panel, layout = getattr(preview_panels, name), Layout()
         assert panel.poll(context) and not panel.poll(SimpleNamespace(engine="CYCLES"))
         panel.draw(SimpleNamespace(layout=layout), context)
         shown += layout.shown
-    assert {"technique", "samples", "render_samples", "mode", "shadow_cascades", "film_transparent", "use_irradiance"} <= set(shown)
+    assert {"technique", "samples", "render_samples", "mode", "shadow_cascades", "film_transparent", "use_irradiance",
+            "probes", "bounds", "leaks", "overlays_in_renders", "compare"} <= set(shown)
+    assert "split" not in shown
+    scene.rtgi_preview.compare, layout = True, Layout()
+    preview_panels.RTGI_PT_preview_compare.draw(SimpleNamespace(layout=layout), context)
+    assert {"compare_technique", "split"} <= set(layout.shown) and "Nothing baked" in " ".join(layout.texts)
+    scene.rtgi_preview.compare = False
     header = Layout()
     preview_panels.draw_header(SimpleNamespace(layout=header), context)
-    assert header.shown == ["technique", "mode", "rtgi.bake"]
+    assert header.shown == ["technique", "mode", "compare", "rtgi.bake"]
     context.space_data.shading.type = "SOLID"
     empty = Layout()
     preview_panels.draw_header(SimpleNamespace(layout=empty), context)

@@ -46,7 +46,8 @@ def until(done):
             return
         yield STEP
     picture("timeout")
-    state = [(found._renderer and (found._renderer.busy, found._renderer.samples), found._broken) for found in live_viewports()]
+    state = [(found.picture.renderer and (found.unsettled, found.picture.renderer.samples), found._broken)
+             for found in live_viewports()]
     pending = {name: (entry.pending, entry.error) for name, entry in live._live.items()}
     raise TimeoutError(f"waited {PATIENCE} s for {done.__name__}: {state}, {pending}")
 
@@ -73,8 +74,8 @@ def looked_at(name):
 
 def settled():
     """True once the viewport has nothing left to read, relight or average."""
-    viewports = [found for found in live_viewports() if found._renderer is not None]
-    return bool(viewports) and not any(found._unsettled for found in viewports) and not any(
+    viewports = [found for found in live_viewports() if found.picture.renderer is not None]
+    return bool(viewports) and not any(found.unsettled for found in viewports) and not any(
         entry.pending for entry in live._live.values())
 
 
@@ -160,7 +161,7 @@ def story():
     other.spaces.active.shading.type = "RENDERED"
     yield 1.0
     yield from until(settled)
-    seen["viewports"] = sum(found._renderer is not None for found in live_viewports())
+    seen["viewports"] = sum(found.picture.renderer is not None for found in live_viewports())
     with bpy.context.temp_override(window=second):
         bpy.ops.wm.window_close()
     yield 0.5
@@ -192,7 +193,7 @@ def story():
     area("VIEW_3D").spaces.active.shading.type = "SOLID"
     yield 0.5
     gc.collect()
-    seen["viewports left"] = sum(found._renderer is not None for found in live_viewports())
+    seen["viewports left"] = sum(found.picture.renderer is not None for found in live_viewports())
 
 
 def run(steps):

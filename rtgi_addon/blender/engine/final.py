@@ -10,6 +10,7 @@ from ...scene import Camera
 from ..extract import extract_scene
 from ..extract.cameras import read_camera
 from ..preview_settings import preview_settings
+from .layer import OverlayLayer
 from .passes import add_passes, passes_of, write_passes
 from .shown import lit_for, shown_for
 
@@ -42,8 +43,14 @@ def render(engine, depsgraph) -> None:
         if not engine.is_preview and time.monotonic() - written > _SHOW_EVERY:
             _write(engine, layer, size, renderer)
             written = time.monotonic()
-    _write(engine, layer, size, renderer)
+    overlay = _overlay(original, shown, view, size, renderer)
+    _write(engine, layer, size, renderer, overlay)
     drawing.step(1.0, "Done")
+
+
+def _overlay(scene, shown, view, size: tuple[int, int], renderer):
+    """What the scene wants to be drawn over the finished picture, or None."""
+    return OverlayLayer().draw(scene, shown, view, size, renderer) if scene.rtgi_preview.overlays_in_renders else None
 
 
 def cropped(camera: Camera, render, size: tuple[int, int]) -> Camera:
@@ -110,11 +117,14 @@ class _Breakable(Progress):
         super().check()
 
 
-def _write(engine, layer, size: tuple[int, int], renderer) -> None:
+def _write(engine, layer, size: tuple[int, int], renderer, overlay=None) -> None:
     add_passes(engine, layer)
     result = engine.begin_result(0, 0, *size, layer=layer.name)
     if result is None:
         raise Cancelled()
     images = {entry.source: renderer.image(entry.source) for entry in passes_of(layer)}
+    if overlay is not None:
+        from ...preview.overlays import laid_over
+        images["combined"] = laid_over(images["combined"], overlay)
     write_passes(result.layers[0], layer, images.__getitem__)
     engine.end_result(result)

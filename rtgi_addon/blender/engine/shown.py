@@ -24,9 +24,9 @@ class Shown:
     baked: Baked | None = None
 
 
-def shown_for(scene: bpy.types.Scene) -> Shown:
-    """What a preview of ``scene`` shows with the technique it has chosen."""
-    technique = get(scene.rtgi.technique)
+def shown_for(scene: bpy.types.Scene, technique_name: str | None = None) -> Shown:
+    """What a preview of ``scene`` shows with the technique it has chosen, or with the one of that name."""
+    technique = get(technique_name or scene.rtgi.technique)
     baked = session.baked.get((scene.name, technique.name))
     if baked is not None:
         return Shown(baked.field, "", baked)

@@ -1,15 +1,16 @@
 """A viewport: brings its renderer up to date with the scene, draws one sample more, and says what it shows."""
 
 import traceback
-from dataclasses import replace
 
 import numpy as np
 
 from ...errors import BakeError
 from ..preview_settings import preview_settings
 from ..session import session
+from .layer import OverlayLayer
 from .live import LiveScene, live_scene
-from .shown import Shown, same_light, shown_for
+from .picture import Picture
+from .shown import Shown, shown_for
 
 STALE = "The bake is out of date"
 
@@ -24,9 +25,8 @@ class Viewport:
     """The state of one viewport, which lives as long as Blender's engine object for it."""
 
     def __init__(self):
-        self._renderer = None
-        self._settings = self._field = self._seen = None
-        self._size = (0, 0)
+        self.picture, self.other = Picture(), Picture()
+        self._layer = OverlayLayer()
         self._broken = ""
         self._begun = False
 
@@ -64,43 +64,45 @@ class Viewport:
     def _frame(self, engine, context, scene, live: LiveScene, shown: Shown) -> None:
         from ...preview.camera_view import CameraView
         from ...preview.present import present
-        from ...preview.renderer import PreviewRenderer
         settings = preview_settings(scene, final=False)
-        if self._renderer is None or settings != self._settings or shown.field is not self._field:
-            self.close()
-            baked = None if shown.baked is None else shown.baked.scene
-            begun = live.scene
-            if baked is not None and not same_light(baked, begun):
-                begun = replace(begun, lights=baked.lights, world=baked.world)
-            self._renderer = PreviewRenderer(begun, shown.field, settings, (settings.mode,), baked)
-            self._settings, self._field, self._seen = settings, shown.field, None
-        self._renderer.update(live.scene)
         region, view = context.region, context.region_data
         seen = CameraView(np.array(view.view_matrix.inverted(), np.float64), np.array(view.window_matrix, np.float64))
         size = region.width, region.height
-        same_picture = seen.equals(self._seen) and size == self._size
-        if not same_picture or self._unsettled:
-            self._renderer.frame(seen, size)
-            self._seen, self._size = seen, size
-        present(self._renderer.textures[settings.mode], size)
-        if self._unsettled:
+        self.picture.frame(live.scene, shown, settings, seen, size)
+        preview = scene.rtgi_preview
+        if preview.compare:
+            split = round(preview.split * size[0])
+            self.other.frame(live.scene, shown_for(scene, preview.compare_technique), settings, seen, size)
+            present(self.picture.texture, size, (0, split))
+            present(self.other.texture, size, (split, size[0]))
+        else:
+            self.other.close()
+            present(self.picture.texture, size)
+        overlay = self._layer.draw(scene, shown, seen, size, self.picture.renderer)
+        if overlay is not None:
+            present(overlay, size)
+        if self.unsettled:
             engine.tag_redraw()
 
     @property
-    def _unsettled(self) -> bool:
-        """True while another frame would change the picture."""
-        return self._renderer.busy or self._renderer.samples < self._settings.samples
+    def unsettled(self) -> bool:
+        """True while another frame would change what is seen."""
+        return self.picture.unsettled or self.other.unsettled
 
     def close(self) -> None:
-        """Let go of the renderer and its workers."""
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
+        """Let go of renderers and their workers."""
+        self.picture.close()
+        self.other.close()
 
     def _status(self, scene, live: LiveScene, shown: Shown) -> str:
-        parts = [f"Sample {self._renderer.samples} of {self._settings.samples}"]
-        if self._renderer.busy:
+        renderer = self.picture.renderer
+        parts = [f"Sample {renderer.samples} of {renderer.settings.samples}"]
+        if renderer.busy:
             parts.append("Relighting")
         if is_stale(scene, shown):
             parts.append(STALE)
-        return " | ".join([*parts, *(text for text in (shown.note, live.error, self._renderer.error) if text)])
+        notes = [shown.note, live.error, renderer.error]
+        if scene.rtgi_preview.compare:
+            other = shown_for(scene, scene.rtgi_preview.compare_technique)
+            notes.append(other.note and f"Right of the line: {other.note}")
+        return " | ".join([*parts, *(text for text in notes if text)])

@@ -1,0 +1,213 @@
+"""Leaks in Blender: an operator that compares the bake with the path reference on a worker thread, and what it found, by cause."""
+
+import bpy
+import numpy as np
+
+from ..errors import BakeError
+from ..progress import Progress
+from . import dependencies
+from .panels import draw_lines
+from .session import redraw, session
+from .worker import BakeWorker, Report
+
+_TICK, _GRACE = 0.1, 5.0
+
+
+class Leaks:
+    """The search under way (``worker``, for the scene and technique ``searching``), and by scene name and technique what was found
+    with the field that it was found in."""
+
+    def __init__(self):
+        self.worker: BakeWorker | None = None
+        self.searching: tuple[str, str] = "", ""
+        self.found: dict[tuple[str, str], tuple] = {}
+
+    @property
+    def running(self) -> bool:
+        """True while rays are traced."""
+        return self.worker is not None and self.worker.running
+
+    def of(self, scene: bpy.types.Scene, field):
+        """The LeakMap of ``field`` in ``scene``, or None: another bake has others."""
+        for (name, _), (measured, found) in self.found.items():
+            if name == scene.name and measured is field:
+                return found
+        return None
+
+
+leaks = Leaks()
+
+
+class RTGI_OT_find_leaks(bpy.types.Operator):
+    """Compare the last bake of this session with the path reference on the scene's surfaces, and say why it is off where it is"""
+
+    bl_idname = "rtgi.find_leaks"
+    bl_label = "Find Leaks"
+    bl_options = {"REGISTER"}
+
+    points: bpy.props.IntProperty(name="Points", description="How many points of surfaces are looked at", default=2000, min=16,
+                                  max=100000)
+
+    @classmethod
+    def poll(cls, context):
+        """Only with a bake of this session, and not while another one runs."""
+        if leaks.running or session.running:
+            cls.poll_message_set("A bake or a search is already running")
+            return False
+        if (context.scene.name, context.scene.rtgi.technique) not in session.baked:
+            cls.poll_message_set("Bake with this technique first: a bake from disk has no scene to compare with")
+            return False
+        return True
+
+    def execute(self, context):
+        """Search here and now: for scripts and for Blender without a window."""
+        if not self._prepared(context, on_report=lambda report: None):
+            return {"CANCELLED"}
+        leaks.worker.run()
+        return self._finish()
+
+    def invoke(self, context, event):
+        """Search on a thread while the window stays alive."""
+        if bpy.app.background:
+            return self.execute(context)
+        if not self._prepared(context):
+            return {"CANCELLED"}
+        self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
+        context.window_manager.modal_handler_add(self)
+        leaks.worker.start()
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        """Show progress at every tick; stop on Esc; leave everything else to Blender."""
+        worker = leaks.worker
+        if event.type == "ESC" and event.value == "PRESS":
+            worker.cancel()
+            return {"RUNNING_MODAL"}
+        if event.type != "TIMER":
+            return {"PASS_THROUGH"}
+        if worker.poll():
+            self._show(context, worker.report)
+            return {"PASS_THROUGH"}
+        self._clean_up(context)
+        return self._finish()
+
+    def cancel(self, context):
+        """Blender ends the operator itself."""
+        if leaks.worker is not None:
+            leaks.worker.cancel()
+        self._clean_up(context)
+
+    def _prepared(self, context, on_report=None) -> bool:
+        """Whether there is now a worker that can run; a reason against it was reported."""
+        try:
+            if leaks.worker is not None and not leaks.worker.join(_GRACE):
+                raise BakeError("the search that was cancelled is still ending", "try again in a moment")
+            dependencies.require()
+        except BakeError as error:
+            self.report({"ERROR"}, str(error))
+            return False
+        from ..evaluate.leaks import find_leaks
+        from ..transport.context import LightContext
+        key = context.scene.name, context.scene.rtgi.technique
+        baked, points = session.baked[key], self.points
+
+        def search(progress: Progress):
+            return baked.field, find_leaks(LightContext(baked.scene), baked.field, points, progress=progress)
+
+        leaks.worker, leaks.searching = BakeWorker(search, on_report), key
+        return True
+
+    def _finish(self):
+        outcome = leaks.worker.outcome
+        if outcome.error:
+            self.report({"ERROR"}, outcome.error)
+            return {"CANCELLED"}
+        if outcome.cancelled:
+            self.report({"INFO"}, "Search cancelled; what was found before is kept")
+            return {"CANCELLED"}
+        leaks.found[leaks.searching] = outcome.summary
+        redraw()
+        self.report({"INFO"}, outcome.summary[1].lines()[0])
+        return {"FINISHED"}
+
+    def _show(self, context, report: Report) -> None:
+        stopping = leaks.worker.progress.cancelled
+        context.workspace.status_text_set("RTGI: cancelling…" if stopping else f"RTGI: {report.text}  |  Esc to cancel")
+
+    def _clean_up(self, context) -> None:
+        if self._timer is not None:
+            context.window_manager.event_timer_remove(self._timer)
+            self._timer = None
+        for workspace in bpy.data.workspaces:  # the user may have gone to another since
+            with context.temp_override(workspace=workspace):
+                workspace.status_text_set(None)
+
+    _timer = None
+
+
+class RTGI_PT_leaks(bpy.types.Panel):
+    """How much light goes where it should not, and why."""
+
+    bl_label = "Leaks"
+    bl_parent_id = "RTGI_PT_bake"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "RTGI"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        """The button, the receivers by cause, the cause at the 3D cursor, and the switch of the overlay."""
+        layout, scene, width = self.layout, context.scene, context.region.width
+        layout.operator("rtgi.find_leaks", icon="VIEWZOOM")
+        found = leaks.found.get((scene.name, scene.rtgi.technique))
+        if found is None:
+            return
+        field, leak_map = found
+        lines = leak_map.lines()
+        for number, line in enumerate(lines):
+            draw_lines(layout, line, width, "ERROR" if number == 0 and len(lines) > 1 else "BLANK1" if number else "CHECKMARK")
+        row = leak_map.nearest(np.array(scene.cursor.location))
+        if row is not None:
+            draw_lines(layout, f"At the 3D cursor: {at_receiver(leak_map, row)}", width, "PIVOT_CURSOR")
+        baked = session.baked.get((scene.name, scene.rtgi.technique))
+        if baked is None or baked.field is not field:
+            draw_lines(layout, "Found in an earlier bake", width, "INFO")
+        layout.prop(scene.rtgi_preview, "leaks", text="Show on Surfaces")
+
+
+def at_receiver(leak_map, row: int) -> str:
+    """What a LeakMap says of one receiver."""
+    from ..evaluate.leaks import Cause
+    cause = Cause(int(leak_map.cause[row]))
+    off = f"{100.0 * leak_map.error[row]:+.0f}%"
+    return off if cause is Cause.NONE else f"{off}, {cause.text}"
+
+
+@bpy.app.handlers.persistent
+def forget_leaks(*_):
+    """Another file is about to be opened: stop searching, and drop what belongs to the old one's scenes."""
+    if leaks.worker is not None:
+        leaks.worker.cancel()
+    leaks.found.clear()
+
+
+_CLASSES = (RTGI_OT_find_leaks, RTGI_PT_leaks)
+
+
+def register() -> None:
+    """Register operator, panel and handler."""
+    for cls in _CLASSES:
+        bpy.utils.register_class(cls)
+    bpy.app.handlers.load_pre.append(forget_leaks)
+
+
+def unregister() -> None:
+    """Stop a running search, give it a moment to end, and take everything out."""
+    if leaks.worker is not None:
+        leaks.worker.cancel()
+        leaks.worker.join(_GRACE)
+        leaks.worker = None
+    leaks.found.clear()
+    bpy.app.handlers.load_pre.remove(forget_leaks)
+    for cls in reversed(_CLASSES):
+        bpy.utils.unregister_class(cls)

@@ -1,0 +1,139 @@
+"""What a viewport puts into its region: one technique or two with a line between, and overlays on top."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import rtgi_addon
+
+SIZE = 48, 32
+
+
+@pytest.fixture
+def scene(gpu_device, empty_blend, tmp_path):
+    """A room with a lamp, a camera and a lattice, baked with probes."""
+    bpy = empty_blend
+    rtgi_addon.register()
+    bpy.ops.mesh.primitive_cube_add(size=4)
+    bpy.ops.object.light_add(type="POINT", location=(0.5, 0.0, 1.0))
+    bpy.context.object.data.energy = 100
+    bpy.ops.object.lightprobe_add(type="VOLUME")
+    bpy.context.object.scale = (1.6, 1.6, 1.6)
+    probe = bpy.context.object.data
+    probe.resolution_x = probe.resolution_y = probe.resolution_z = 2
+    bpy.ops.object.camera_add(location=(0, -1.9, 0), rotation=(np.pi / 2, 0, 0))
+    scene = bpy.context.scene
+    scene.camera = bpy.context.object
+    scene.camera.data.lens = 18
+    scene.render.resolution_x, scene.render.resolution_y = SIZE
+    scene.rtgi.output, scene.rtgi.mode, scene.rtgi.technique_probes.rays = str(tmp_path / "bake"), "RAYS", 64
+    bpy.ops.rtgi.bake()
+    scene.rtgi_preview.samples, scene.rtgi_preview.shadow_resolution = 1, 128
+    yield scene
+    scene.render.engine = "BLENDER_WORKBENCH"
+    rtgi_addon.unregister()
+
+
+class Engine:
+    """What a viewport asks of Blender's engine object."""
+
+    def __init__(self):
+        self.stats, self.redraws = "", 0
+
+    def update_stats(self, _name, text):
+        self.stats = text
+
+    def tag_redraw(self):
+        self.redraws += 1
+
+
+def drawn(viewport=None):
+    """The region (h, w, 4) that a viewport through the scene's camera fills, row 0 at the bottom, and the engine's line."""
+    import bpy
+
+    from rtgi_addon.blender.engine.live import live_scene
+    from rtgi_addon.blender.engine.viewport import Viewport
+    from rtgi_addon.preview.device import RenderTarget
+    from rtgi_addon.preview.textures import download
+    depsgraph, camera = bpy.context.evaluated_depsgraph_get(), bpy.context.scene.camera
+    live_scene(depsgraph).read(depsgraph)
+    projection = camera.calc_matrix_camera(depsgraph, x=SIZE[0], y=SIZE[1])
+    view = SimpleNamespace(view_matrix=camera.matrix_world.inverted(), window_matrix=projection)
+    context = SimpleNamespace(region=SimpleNamespace(width=SIZE[0], height=SIZE[1]), region_data=view)
+    engine, target, viewport = Engine(), RenderTarget(*SIZE, ("RGBA32F",)), viewport or Viewport()
+    with target.drawing():
+        viewport.draw(engine, context, depsgraph)
+    assert not viewport._broken
+    return download(target.colors[0]), engine.stats
+
+
+def test_two_techniques_with_a_line_between(scene):
+    alone, _ = drawn()
+    assert alone[..., :3].min() > 0
+    scene.rtgi_preview.compare, scene.rtgi_preview.compare_technique, scene.rtgi_preview.split = True, "vpl", 0.25
+    both, stats = drawn()
+    assert "Right of the line: " in stats and "of the technique probes" in stats
+    np.testing.assert_allclose(both[:, :12], alone[:, :12], atol=1e-5)
+    assert np.all(both[:, 12:14] == 1.0)
+    # No bake of it: direct light alone.
+    assert both[:, 14:, :3].mean() < 0.9 * alone[:, 14:, :3].mean()
+    scene.rtgi_preview.compare_technique = "probes"
+    same, stats = drawn()
+    np.testing.assert_allclose(same[:, 14:], alone[:, 14:], atol=1e-5)
+    assert "Right of the line" not in stats
+
+
+def test_a_viewport_follows_the_switches(scene):
+    from rtgi_addon.blender.engine.viewport import Viewport
+    viewport = Viewport()
+    plain, _ = drawn(viewport)
+    assert viewport.other.renderer is None
+    scene.rtgi_preview.compare = True
+    drawn(viewport)
+    assert viewport.other.renderer is not None
+    scene.rtgi_preview.compare, scene.rtgi_preview.probes, scene.rtgi_preview.probe_size = False, "validity", 0.8
+    spheres, _ = drawn(viewport)
+    assert viewport.other.renderer is None
+    green = (spheres[..., 1] > 2 * spheres[..., 0]) & (spheres[..., 1] > 2 * spheres[..., 2])
+    assert 0.01 < green.mean() < 0.5
+    assert 0.3 < np.isclose(spheres, plain, atol=1e-5).all(axis=-1).mean() < 0.99
+    scene.rtgi_preview.probes = "none"
+    again, _ = drawn(viewport)
+    np.testing.assert_allclose(again, plain, atol=1e-5)
+
+
+def test_leaks_are_shown_of_the_bake_that_has_them(scene):
+    import bpy
+    scene.rtgi_preview.leaks = True
+    plain, _ = drawn()
+    bpy.ops.rtgi.find_leaks(points=200)
+    marked, _ = drawn()
+    assert np.abs(marked - plain).mean() > 0.01
+    bpy.ops.rtgi.bake()
+    after, _ = drawn()
+    np.testing.assert_allclose(after, plain, rtol=0.2, atol=0.05)
+
+
+def test_renders_have_overlays_where_they_are_asked_for(scene, tmp_path):
+    import bpy
+    scene.render.engine = "RTGI"
+    scene.rtgi_preview.render_samples, scene.rtgi_preview.probes, scene.rtgi_preview.probe_size = 1, "validity", 0.8
+
+    def rendered():
+        settings = scene.render.image_settings
+        if hasattr(settings, "media_type"):
+            settings.media_type = "IMAGE"
+        settings.file_format, settings.color_depth = "OPEN_EXR", "32"
+        scene.render.filepath = str(tmp_path / "picture.exr")
+        bpy.ops.render.render(write_still=True)
+        image = bpy.data.images.load(scene.render.filepath)
+        pixels = np.array(image.pixels, np.float32).reshape(*SIZE[::-1], 4)
+        bpy.data.images.remove(image)
+        return pixels
+
+    plain = rendered()
+    scene.rtgi_preview.overlays_in_renders = True
+    marked = rendered()
+    green = (marked[..., 1] > 2 * marked[..., 0]) & (marked[..., 1] > 2 * marked[..., 2])
+    assert 0.01 < green.mean() < 0.5 and 0.3 < (plain == marked).all(axis=-1).mean() < 0.99
