@@ -26,7 +26,7 @@ test-fast: setup     ## run the tests that take less than a few seconds each
 lint: setup          ## check style
 	$(PYTHON) -m ruff check .
 
-charts: setup        ## chart speed against accuracy of every sample into benchmarks/results/charts (about half an hour)
+charts: setup        ## chart speed against accuracy of every sample into benchmarks/results/charts (some minutes each)
 	$(PYTHON) benchmarks/charts.py
 
 bench: setup         ## measure again what benchmarks/README.md says

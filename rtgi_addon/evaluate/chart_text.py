@@ -141,4 +141,4 @@ def _range(value: Interval, text) -> str:
 def _signed(value: Interval) -> str:
     half = None if value.low is None else 50 * (value.high - value.low)
     half = "" if half is None or half < 0.005 else f" ± {half:.2g}"
-    return f"{100 * value.mean:+.2g}{half} %"
+    return (f"{100 * value.mean:+.2g}" if abs(value.mean) < 0.0995 else f"{100 * value.mean:+.0f}") + f"{half} %"
