@@ -32,8 +32,8 @@ from .references import PathReference, Truth
 EXCESS, LEVEL, SIGMAS = 0.25, 0.05, 3.0
 # Signed errors are relative to the truth, or to this share of its mean where that is more.
 FAINT = 0.1
-# Noise of the reference, and the most paths a receiver.
-NOISE, MOST_PATHS = 0.03, 4096
+# Noise of the reference, and the most paths of all receivers together.
+NOISE, MOST_PATHS = 0.03, 1 << 23
 # A cause explains a leak if at least this share of the excess came its way.
 BLAMED = 0.5
 # Surfaces nearer together than this share of the spacing are one sheet.
