@@ -57,7 +57,9 @@ def drawn(viewport=None):
     from rtgi_addon.preview.device import RenderTarget
     from rtgi_addon.preview.textures import download
     depsgraph, camera = bpy.context.evaluated_depsgraph_get(), bpy.context.scene.camera
-    live_scene(depsgraph).read(depsgraph)
+    live = live_scene(depsgraph)
+    if live.scene is None:
+        live.read(depsgraph)
     projection = camera.calc_matrix_camera(depsgraph, x=SIZE[0], y=SIZE[1])
     view = SimpleNamespace(view_matrix=camera.matrix_world.inverted(), window_matrix=projection)
     context = SimpleNamespace(region=SimpleNamespace(width=SIZE[0], height=SIZE[1]), region_data=view)
