@@ -40,3 +40,5 @@ bench: setup         ## measure again what benchmarks/README.md says
 	$(PYTHON) benchmarks/rsm_capture.py
 	$(PYTHON) benchmarks/gpu_kernels.py
 	$(PYTHON) benchmarks/linear_cost.py
+	$(PYTHON) benchmarks/preview.py
+	$(PYTHON) benchmarks/preview_vs_cycles.py

@@ -15,8 +15,8 @@ the average of Cycles' renders, pixel by pixel, which would be in the first othe
 between the baked field and the path reference at the points that a coarse grid of pixels sees: it tells the lattice's error from
 the renderer's.
 
-What Cycles and EEVEE rendered is kept in benchmarks/results for later runs with the same size and samples (``--again`` renders
-anew). A sheet a sample goes to benchmarks/results/preview_SAMPLE.png: RTGI, EEVEE with its own volume baked, and Cycles; below,
+What Cycles and EEVEE rendered is kept in benchmarks/results for later runs of that size with no more samples (``--again``
+renders anew). A sheet a sample goes to benchmarks/results/preview_SAMPLE.png: RTGI, EEVEE with its own volume baked, and Cycles; below,
 the indirect light of RTGI, the signed difference, and the indirect light of Cycles. ``--overview FILE.jpg`` puts the first row of
 all into one picture.
 """
@@ -34,14 +34,18 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
+from benchmarks.preview import seen_by  # noqa: E402
 from rtgi_addon.blender.cli.streams import Streams  # noqa: E402
 from rtgi_addon.blender.cycles_reference import CyclesSettings, rendering  # noqa: E402
 from rtgi_addon.blender.extract import extract_scene  # noqa: E402
 from rtgi_addon.blender.gpu_context import open_context  # noqa: E402
-from rtgi_addon.evaluate.error_map import ErrorMap  # noqa: E402
+from rtgi_addon.evaluate.receivers import Receivers  # noqa: E402
+from rtgi_addon.evaluate.references import PathReference, Truth  # noqa: E402
 from rtgi_addon.jobs.field import bake_field  # noqa: E402
 from rtgi_addon.preview.settings import PreviewSettings  # noqa: E402
+from rtgi_addon.scene import Scene  # noqa: E402
 from rtgi_addon.transport.context import LightContext  # noqa: E402
+from rtgi_addon.transport.rays import offset_origins  # noqa: E402
 from rtgi_addon.transport.vectors import luminance  # noqa: E402
 
 RESULTS = ROOT / "benchmarks/results"
@@ -53,7 +57,7 @@ LAMPS = "rtgi_lamps"
 # Passes of what surfaces and the world send to the camera themselves, as versions of Blender name them.
 SEEN_ITSELF = ("Emit", "Emission", "Env", "Environment")
 # The grid of pixels at which the path reference says what the field itself is off by.
-FIELD_GRID = (48, 27)
+FIELD_GRID, FIELD_NOISE, FIELD_PATHS = (24, 14), 0.015, 6_000_000
 # Side [pixels] of the blocks in which Cycles' noise is averaged out.
 BLOCK = 8
 
@@ -72,8 +76,17 @@ def open_sample(name: str, size: tuple[int, int], density: float = 1.0) -> bpy.t
     return scene
 
 
-def render_rtgi(name: str, size, density: float, samples: int, threads: int | None) -> dict:
-    """Passes (h, w, 3), row 0 at the top, which pixels show a surface, seconds, and the difference of the field."""
+def field_truth(scene: Scene, threads: int | None) -> tuple[Receivers, Truth]:
+    """Points on the surfaces that the first camera sees, and the path reference's irradiance there."""
+    position, normal = (texels.reshape(-1, 4)[:, :3] for texels in seen_by(scene, scene.cameras[0], FIELD_GRID))
+    seen = np.any(normal != 0, axis=1)
+    receivers = Receivers(offset_origins(position[seen], normal[seen], normal[seen]), normal[seen], np.ones(seen.sum(), bool))
+    return receivers, PathReference(LightContext(scene, threads), FIELD_NOISE, FIELD_PATHS).irradiance(receivers)
+
+
+def render_rtgi(name: str, size, density: float, samples: int, threads: int | None, held: tuple | None) -> dict:
+    """Passes (h, w, 3), row 0 at the top, which pixels show a surface, seconds, and the difference of the field to ``held``
+    (what ``field_truth`` returns, made here for None)."""
     from rtgi_addon.preview.camera_view import CameraView
     from rtgi_addon.preview.renderer import PreviewRenderer
     open_sample(name, size, density)
@@ -88,11 +101,10 @@ def render_rtgi(name: str, size, density: float, samples: int, threads: int | No
     found["seen"] = np.flipud(renderer.image("object"))[..., 0] > 0.5
     drawn = time.perf_counter()
     renderer.close()
-    shown = ErrorMap(LightContext(scene, threads), FIELD_GRID)
-    true = shown.truth.mean
-    irradiance = field.irradiance(shown.receivers.points, shown.receivers.normals)
-    off = float(np.abs(irradiance - true).mean() / true.mean()) if true.size and true.mean() > 0 else 0.0
-    return {**found, "bake_seconds": baked - started, "draw_seconds": drawn - baked, "field": off,
+    receivers, truth = held = held or field_truth(scene, threads)
+    off = np.abs(field.irradiance(receivers.points, receivers.normals) - truth.mean).mean()
+    off = float(off / truth.mean.mean()) if truth.mean.size and truth.mean.mean() > 0 else 0.0
+    return {**found, "held": held, "bake_seconds": baked - started, "draw_seconds": drawn - baked, "field": off,
             "probes": sum(grid.sh[..., 0, 0].size for grid in field.grids())}
 
 
@@ -206,33 +218,34 @@ def signed_colours(error: np.ndarray) -> np.ndarray:
     return colormaps["RdBu_r"](np.clip(0.5 + 2.0 * error, 0.0, 1.0))[..., :3]
 
 
-def kept(path: Path, render, again: bool) -> dict:
-    """The arrays in ``path``, or what ``render()`` returns, stored there."""
-    if path.exists() and not again:
-        with np.load(path) as data:
-            return {key: data[key] for key in data.files}
+def kept(name: str, samples: int, render, again: bool) -> dict:
+    """The arrays that are kept as ``name`` with at least so many samples, or what ``render()`` returns, kept from now on."""
+    stored = {int(path.stem.rsplit("_", 1)[1]): path for path in RESULTS.glob(f"{name}_*.npz")}
+    if max(stored, default=0) >= samples and not again:
+        with np.load(stored[max(stored)]) as data:
+            return {"samples": max(stored), **{key: data[key] for key in data.files}}
     found = {key: np.asarray(value, np.float32) for key, value in render().items()}
-    np.savez_compressed(path, **found)
-    return found
+    np.savez_compressed(RESULTS / f"{name}_{samples}.npz", **found)
+    return {"samples": samples, **found}
 
 
 def compare(name: str, options, say) -> tuple[list[dict], list]:
     """The rows of one sample, one for each density, and the first row of its sheet."""
     size = tuple(options.size)
     tag = f"{name}_{size[0]}x{size[1]}"
-    cycles = kept(RESULTS / f"cycles_{tag}_{options.cycles_samples}.npz",
+    cycles = kept(f"cycles_{tag}", options.cycles_samples,
                   lambda: render_cycles(name, size, options.cycles_samples, options.threads), options.again)
-    eevee = None if options.no_eevee else kept(RESULTS / f"eevee_{tag}_{options.eevee_samples}.npz",
+    eevee = None if options.no_eevee else kept(f"eevee_{tag}", options.eevee_samples,
                                                lambda: {"combined": render_eevee(name, size, options.eevee_samples)},
                                                options.again)["combined"]
-    results = []
+    results, held = [], None
     for density in options.density:
-        found = render_rtgi(name, size, density, options.samples, options.threads)
-        seen = found["seen"]
+        found = render_rtgi(name, size, density, options.samples, options.threads, held)
+        seen, held = found["seen"], found["held"]
         results.append({"sample": name, "density": density, "size": size, "probes": found["probes"], "field": found["field"],
                         "bake_seconds": found["bake_seconds"], "draw_seconds": found["draw_seconds"],
                         "cycles_seconds": float(cycles["seconds"]), "samples": options.samples,
-                        "cycles_samples": options.cycles_samples,
+                        "cycles_samples": cycles["samples"],
                         **{part: difference(found[part], cycles[part], seen) for part in PARTS}})
         if eevee is not None and density == options.density[0]:
             results[-1]["eevee"] = difference(eevee, cycles["combined"], seen)
