@@ -188,7 +188,7 @@ def test_slots_by_object_and_by_mesh(empty_blend):
     assert named(scene, "plain")[0].mesh == named(scene, "other")[0].mesh
     for name in ("bare", "empty"):
         index, = {int(i) for i in scene.meshes[named(scene, name)[0].mesh].triangle_material}
-        np.testing.assert_allclose(scene.materials[index].albedo.constant, 0.8, atol=1e-6)
+        np.testing.assert_allclose(scene.materials[index].base_color.constant, 0.8, atol=1e-6)
     assert sorted(entry.name for entry in scene.materials) == sorted({entry.name for entry in scene.materials})
 
 

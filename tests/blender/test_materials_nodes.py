@@ -271,7 +271,7 @@ def test_a_material_without_a_surface_is_black_and_with_only_a_volume_is_nothing
 
 def test_no_material_and_a_material_without_nodes(empty_blend):
     (read,), *_ = read_object(grid_object(None))
-    assert np.allclose(read.albedo.constant, 0.8)
+    assert np.allclose(read.base_color.constant, 0.8)
     material = bpy.data.materials.new("plain")
     if material.node_tree is not None:
         pytest.skip("materials always have nodes in this Blender")

@@ -16,6 +16,8 @@ from materials_testing import (  # noqa: E402
     read_object,
 )
 
+from rtgi_addon.blender.extract import extract_scene  # noqa: E402
+
 pytestmark = pytest.mark.blender
 
 
@@ -59,7 +61,8 @@ def furnace(material, path):
     scene.camera = camera
     bpy.ops.mesh.primitive_uv_sphere_add(segments=96, ring_count=48, radius=1.0)
     bpy.ops.object.shade_smooth()
-    bpy.context.object.data.materials.append(material)
+    if material is not None:
+        bpy.context.object.data.materials.append(material)
     bpy.ops.render.render(write_still=True)
     image = bpy.data.images.load(scene.render.filepath)
     pixels = np.array(image.pixels[:]).reshape(-1, 4)
@@ -83,6 +86,13 @@ def test_principled_albedo_is_that_of_the_white_furnace(empty_blend, tmp_path, i
     expected = furnace(material, tmp_path)
     tolerance = 0.02 if "Coat_Weight" in inputs else 0.006
     assert np.abs(only(material).albedo.constant - expected).max() < tolerance
+
+
+def test_a_mesh_without_a_material_reflects_what_cycles_gives_it(empty_blend, tmp_path):
+    expected = furnace(None, tmp_path)
+    (read,) = extract_scene().materials
+    assert np.abs(read.albedo.constant - expected).max() < 0.004
+    assert np.allclose(read.base_color.constant, 0.8)
 
 
 @pytest.mark.parametrize("kind, color", [("ShaderNodeBsdfAnisotropic", "Color"), ("ShaderNodeBsdfMetallic", "Base Color")])

@@ -1,6 +1,7 @@
 """The door to materials: what extraction calls, a cache per datablock, and the report."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import bpy
 import numpy as np
@@ -12,7 +13,7 @@ from ..remembered import answer
 from .fallback import BAKE_UV, BakedNodes, BakedShaders, bake_leaves, wanted_leaves
 from .images import ImageCache
 from .nodes import ACTIVE_COLOR, NodeReader
-from .shaders import ShaderReader, Surface
+from .shaders import ShaderReader, Surface, default_surface
 from .values import Unreadable, Value, apply, texels
 
 __all__ = ["ACTIVE_COLOR", "BakeRequest", "MaterialReader"]
@@ -54,9 +55,9 @@ class MaterialReader:
             self._discard(request)
 
     def read(self, material) -> Material | None:
-        """The material as nodes give it (``None`` is Blender's grey default); None if it takes a Cycles bake on each mesh."""
+        """The material as nodes give it (``None`` is Blender's default surface); None if it takes a Cycles bake on each mesh."""
         if material is None:
-            return Material("default")
+            return self._default
         material = material.original
         if material.name_full not in self._read:
             self._read[material.name_full] = self._from_nodes(material)
@@ -109,6 +110,13 @@ class MaterialReader:
             self._note(f"material '{material.name}': {remark}")
         self.attributes |= attributes
         return result
+
+    @cached_property
+    def _default(self) -> Material:
+        # Up to 4.5 it was a plain diffuse one.
+        surface = default_surface() if bpy.app.version >= (5, 0) else Surface(Value.of(0.8), base_color=Value.of(0.8))
+        return Material("default", _channel(surface.albedo), base_color=_channel(surface.base_color),
+                        roughness=_channel(surface.roughness), specular=_channel(surface.specular))
 
     def _material(self, source, surface: Surface, extraction: str) -> Material:
         """A surface as a Material. Raises Unreadable if a channel cannot hold it."""

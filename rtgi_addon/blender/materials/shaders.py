@@ -26,6 +26,14 @@ class Surface:
     specular: Value = _BLACK
 
 
+def default_surface() -> Surface:
+    """What Cycles from 5.0 on gives a mesh without a material: a Principled BSDF as it is when it is added, gloss included."""
+    base, roughness, reflectance = 0.8, 0.5, albedo.reflectance_from_ior(1.5)
+    specular = albedo.dielectric_specular(roughness, reflectance)
+    return Surface(Value.of(base * (1.0 - specular) + specular), base_color=Value.of(base), roughness=Value.of(roughness),
+                   specular=Value.of(reflectance))
+
+
 class ShaderReader:
     """Reads the surface of one material through a ``NodeReader``; ``remarks`` are the approximations that were made."""
 
