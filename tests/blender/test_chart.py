@@ -58,6 +58,7 @@ def offset(monkeypatch, empty_blend, tmp_path):
     for name in set(registry()) - {"probes"}:
         monkeypatch.delitem(registry(), name)
     monkeypatch.setattr(type(registry()["probes"]), "sweep", lambda self: ())
+    monkeypatch.setattr(type(registry()["probes"]), "lattices", ())
     monkeypatch.setitem(registry(), "offset", technique)
     rtgi_addon.register()
     bpy.ops.mesh.primitive_cube_add(size=4)
