@@ -16,9 +16,9 @@ between the baked field and the path reference at the points that a coarse grid 
 the renderer's.
 
 What Cycles and EEVEE rendered is kept in benchmarks/results for later runs of that size with no more samples (``--again``
-renders anew). A sheet a sample goes to benchmarks/results/preview_SAMPLE.png: RTGI, EEVEE with its own volume baked, and Cycles; below,
-the indirect light of RTGI, the signed difference, and the indirect light of Cycles. ``--overview FILE.jpg`` puts the first row of
-all into one picture.
+renders anew). A sheet a sample goes to benchmarks/results/preview_SAMPLE.png: RTGI, EEVEE after a bake of its own volumes, and
+Cycles; below, the indirect light of RTGI, the signed difference, and the indirect light of Cycles. ``--overview FILE.jpg`` puts
+the first row of all into one picture.
 """
 
 import argparse
@@ -145,7 +145,11 @@ def render_eevee(name: str, size, samples: int) -> np.ndarray:
     scene.eevee.taa_render_samples = samples
     bpy.ops.object.lightprobe_cache_bake(subset="ALL")
     with tempfile.TemporaryDirectory() as folder:
-        return _render(scene, folder)["Combined"]
+        # A render takes what was baked from the file, not from the session that baked it.
+        path = str(Path(folder) / "baked.blend")
+        bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
+        bpy.ops.wm.open_mainfile(filepath=path)
+        return _render(bpy.context.scene, folder)["Combined"]
 
 
 def _render(scene, folder) -> dict[str, np.ndarray]:
