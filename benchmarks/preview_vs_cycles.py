@@ -260,7 +260,7 @@ def compare(name: str, options, say) -> tuple[list[dict], list]:
     signed = np.where(seen, (luminance(found["combined"]) - luminance(true)) / np.maximum(luminance(true), 0.1 * level), 0.0)
     best = 100 * (results[-1]["combined"]["difference"] or 0.0)
     first = [(f"{name}: RTGI, {results[-1]['probes']:,} probes, {best:.1f} %", displayed(found["combined"])),
-             ("EEVEE", None if eevee is None else displayed(eevee)), ("Cycles", displayed(true))]
+             ("EEVEE, its volume not shown (see README)", None if eevee is None else displayed(eevee)), ("Cycles", displayed(true))]
     below = [("RTGI, indirect", displayed(found["indirect"])), ("RTGI less Cycles (full colour: 25 %)", signed_colours(signed)),
              ("Cycles, indirect", displayed(cycles["indirect"].mean(axis=0)))]
     sheet([first, below], RESULTS / f"preview_{name}.png")
