@@ -146,7 +146,7 @@ def test_the_scene_is_put_back_after_a_failure(empty_blend, monkeypatch):
     def fail(*_):
         raise RuntimeError("the disk is full")
 
-    monkeypatch.setattr(cycles_reference, "_render", fail)
+    monkeypatch.setattr(cycles_reference, "render_picture", fail)
     with pytest.raises(RuntimeError, match="disk"):
         render_probes([(0, 0, 0)], CyclesSettings(samples=1, resolution=16))
     assert everything(scene) == before
