@@ -13,11 +13,11 @@ from ..progress import Progress
 from . import dependencies
 from .bake_job import output_folder
 from .extract import extract_scene
+from .modal_job import GRACE, ModalJob
 from .panels import draw_lines
 from .session import redraw, session
-from .worker import BakeWorker, Report, duration
+from .worker import BakeWorker, duration
 
-_TICK, _GRACE = 0.1, 5.0
 # Rows of the table in the panel.
 _MOST_ROWS = 10
 
@@ -41,12 +41,13 @@ class Charts:
 charts = Charts()
 
 
-class RTGI_OT_chart(bpy.types.Operator):
+class RTGI_OT_chart(ModalJob, bpy.types.Operator):
     """Bake this scene with every technique at several settings and chart their errors against time, rays and memory"""
 
     bl_idname = "rtgi.chart"
     bl_label = "Chart Techniques"
     bl_options = {"REGISTER"}
+    job = charts
 
     seeds: bpy.props.IntProperty(name="Seeds", description="Bakes of each setting, from which intervals follow", default=4, min=1,
                                  max=32)
@@ -68,53 +69,11 @@ class RTGI_OT_chart(bpy.types.Operator):
             return False
         return context.mode == "OBJECT"
 
-    def execute(self, context):
-        """Measure here and now: for scripts and for Blender without a window."""
-        worker = self._worker(context, on_report=lambda report: None)
-        if worker is None:
-            return {"CANCELLED"}
-        worker.run()
-        return self._finish()
-
-    def invoke(self, context, event):
-        """Measure on a thread while the window stays alive."""
-        if bpy.app.background:
-            return self.execute(context)
-        worker = self._worker(context)
-        if worker is None:
-            return {"CANCELLED"}
-        self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
-        context.window_manager.modal_handler_add(self)
-        worker.start()
-        return {"RUNNING_MODAL"}
-
-    def modal(self, context, event):
-        """Show progress at every tick; stop on Esc; leave everything else to Blender."""
-        worker = charts.worker
-        if event.type == "ESC" and event.value == "PRESS":
-            worker.cancel()
-            redraw()
-            return {"RUNNING_MODAL"}
-        if event.type != "TIMER":
-            return {"PASS_THROUGH"}
-        if worker.poll():
-            self._show(context, worker.report)
-            return {"PASS_THROUGH"}
-        self._clean_up(context)
-        return self._finish()
-
-    def cancel(self, context):
-        """Blender ends the operator itself."""
-        if charts.worker is not None:
-            charts.worker.cancel()
-        self._clean_up(context)
-
-    def _worker(self, context, on_report=None) -> BakeWorker | None:
+    def _prepared(self, context, on_report=None) -> BakeWorker | None:
         """The chart of this scene, ready to be measured; None once a reason against it was reported."""
         scene = context.scene
         try:
-            if charts.worker is not None and not charts.worker.join(_GRACE):
-                raise BakeError("the chart that was cancelled is still ending", "try again in a moment")
+            self._require_ended("chart")
             dependencies.require()
             from ..jobs.chart import chart_scene  # needs OpenEXR, without which the add-on still registers
             charts.folder = output_folder(scene.rtgi.output).with_name(output_folder(scene.rtgi.output).name + "_chart")
@@ -156,21 +115,6 @@ class RTGI_OT_chart(bpy.types.Operator):
             _load_image(report.picture)
         self.report({"INFO"}, report.hint or f"Charted {len(report.chart.points)} settings into {report.folder}")
         return {"FINISHED"}
-
-    def _show(self, context, report: Report) -> None:
-        stopping = charts.worker.progress.cancelled
-        context.workspace.status_text_set("RTGI: cancelling…" if stopping else f"RTGI: {report.text}  |  Esc to cancel")
-        redraw()
-
-    def _clean_up(self, context) -> None:
-        if self._timer is not None:
-            context.window_manager.event_timer_remove(self._timer)
-            self._timer = None
-        for workspace in bpy.data.workspaces:  # the user may have gone to another since
-            with context.temp_override(workspace=workspace):
-                workspace.status_text_set(None)
-
-    _timer = None
 
 
 class RTGI_OT_cancel_chart(bpy.types.Operator):
@@ -281,7 +225,7 @@ def unregister() -> None:
     """Stop a running chart, give it a moment to end, and take everything out."""
     if charts.worker is not None:
         charts.worker.cancel()
-        charts.worker.join(_GRACE)
+        charts.worker.join(GRACE)
         charts.worker = None
     charts.charts.clear()
     bpy.app.handlers.load_pre.remove(forget_charts)

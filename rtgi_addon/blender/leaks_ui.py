@@ -6,11 +6,10 @@ import numpy as np
 from ..errors import BakeError
 from ..progress import Progress
 from . import dependencies
+from .modal_job import GRACE, ModalJob
 from .panels import draw_lines
 from .session import redraw, session
-from .worker import BakeWorker, Report
-
-_TICK, _GRACE = 0.1, 5.0
+from .worker import BakeWorker
 
 
 class Leaks:
@@ -38,12 +37,13 @@ class Leaks:
 leaks = Leaks()
 
 
-class RTGI_OT_find_leaks(bpy.types.Operator):
+class RTGI_OT_find_leaks(ModalJob, bpy.types.Operator):
     """Compare the last bake of this session with the path reference on the scene's surfaces, and say why it is off where it is"""
 
     bl_idname = "rtgi.find_leaks"
     bl_label = "Find Leaks"
     bl_options = {"REGISTER"}
+    job = leaks
 
     points: bpy.props.IntProperty(name="Points", description="How many points of surfaces are looked at", default=2000, min=16,
                                   max=100000)
@@ -59,49 +59,10 @@ class RTGI_OT_find_leaks(bpy.types.Operator):
             return False
         return True
 
-    def execute(self, context):
-        """Search here and now: for scripts and for Blender without a window."""
-        if not self._prepared(context, on_report=lambda report: None):
-            return {"CANCELLED"}
-        leaks.worker.run()
-        return self._finish()
-
-    def invoke(self, context, event):
-        """Search on a thread while the window stays alive."""
-        if bpy.app.background:
-            return self.execute(context)
-        if not self._prepared(context):
-            return {"CANCELLED"}
-        self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
-        context.window_manager.modal_handler_add(self)
-        leaks.worker.start()
-        return {"RUNNING_MODAL"}
-
-    def modal(self, context, event):
-        """Show progress at every tick; stop on Esc; leave everything else to Blender."""
-        worker = leaks.worker
-        if event.type == "ESC" and event.value == "PRESS":
-            worker.cancel()
-            return {"RUNNING_MODAL"}
-        if event.type != "TIMER":
-            return {"PASS_THROUGH"}
-        if worker.poll():
-            self._show(context, worker.report)
-            return {"PASS_THROUGH"}
-        self._clean_up(context)
-        return self._finish()
-
-    def cancel(self, context):
-        """Blender ends the operator itself."""
-        if leaks.worker is not None:
-            leaks.worker.cancel()
-        self._clean_up(context)
-
     def _prepared(self, context, on_report=None) -> bool:
         """Whether there is now a worker that can run; a reason against it was reported."""
         try:
-            if leaks.worker is not None and not leaks.worker.join(_GRACE):
-                raise BakeError("the search that was cancelled is still ending", "try again in a moment")
+            self._require_ended("search")
             dependencies.require()
         except BakeError as error:
             self.report({"ERROR"}, str(error))
@@ -129,20 +90,6 @@ class RTGI_OT_find_leaks(bpy.types.Operator):
         redraw()
         self.report({"INFO"}, outcome.summary[1].lines()[0])
         return {"FINISHED"}
-
-    def _show(self, context, report: Report) -> None:
-        stopping = leaks.worker.progress.cancelled
-        context.workspace.status_text_set("RTGI: cancelling…" if stopping else f"RTGI: {report.text}  |  Esc to cancel")
-
-    def _clean_up(self, context) -> None:
-        if self._timer is not None:
-            context.window_manager.event_timer_remove(self._timer)
-            self._timer = None
-        for workspace in bpy.data.workspaces:  # the user may have gone to another since
-            with context.temp_override(workspace=workspace):
-                workspace.status_text_set(None)
-
-    _timer = None
 
 
 class RTGI_PT_leaks(bpy.types.Panel):
@@ -205,7 +152,7 @@ def unregister() -> None:
     """Stop a running search, give it a moment to end, and take everything out."""
     if leaks.worker is not None:
         leaks.worker.cancel()
-        leaks.worker.join(_GRACE)
+        leaks.worker.join(GRACE)
         leaks.worker = None
     leaks.found.clear()
     bpy.app.handlers.load_pre.remove(forget_leaks)

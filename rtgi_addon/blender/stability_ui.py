@@ -7,10 +7,10 @@ from ..errors import BakeError
 from ..progress import Progress
 from . import dependencies
 from .bake_job import output_folder
+from .modal_job import GRACE, ModalJob
 from .session import redraw, session
-from .worker import BakeWorker, Report
+from .worker import BakeWorker
 
-_TICK, _GRACE = 0.1, 5.0
 _TEXT = "RTGI Stability"
 # Blender keeps no reference to the items of a dynamic enumeration.
 _items: list[tuple[str, str, str]] = []
@@ -37,12 +37,13 @@ def _techniques(_self, _context):
     return _items
 
 
-class RTGI_OT_stability(bpy.types.Operator):
+class RTGI_OT_stability(ModalJob, bpy.types.Operator):
     """Bake the built-in scenes in which methods of global illumination are known to fail, and report how much ours do"""
 
     bl_idname = "rtgi.stability"
     bl_label = "Test Stability"
     bl_options = {"REGISTER"}
+    job = suite
 
     technique: bpy.props.EnumProperty(name="Technique", description="Which technique is tested", items=_techniques)
     case: bpy.props.StringProperty(name="Case", description="Only the case of this name; all if empty")
@@ -55,49 +56,10 @@ class RTGI_OT_stability(bpy.types.Operator):
             return False
         return True
 
-    def execute(self, context):
-        """Measure here and now: for scripts and for Blender without a window."""
-        if not self._prepared(context, on_report=lambda report: None):
-            return {"CANCELLED"}
-        suite.worker.run()
-        return self._finish()
-
-    def invoke(self, context, event):
-        """Measure on a thread while the window stays alive."""
-        if bpy.app.background:
-            return self.execute(context)
-        if not self._prepared(context):
-            return {"CANCELLED"}
-        self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
-        context.window_manager.modal_handler_add(self)
-        suite.worker.start()
-        return {"RUNNING_MODAL"}
-
-    def modal(self, context, event):
-        """Show progress at every tick; stop on Esc; leave everything else to Blender."""
-        worker = suite.worker
-        if event.type == "ESC" and event.value == "PRESS":
-            worker.cancel()
-            return {"RUNNING_MODAL"}
-        if event.type != "TIMER":
-            return {"PASS_THROUGH"}
-        if worker.poll():
-            self._show(context, worker.report)
-            return {"PASS_THROUGH"}
-        self._clean_up(context)
-        return self._finish()
-
-    def cancel(self, context):
-        """Blender ends the operator itself."""
-        if suite.worker is not None:
-            suite.worker.cancel()
-        self._clean_up(context)
-
     def _prepared(self, context, on_report=None) -> bool:
         """Whether there is now a worker that can run; a reason against it was reported."""
         try:
-            if suite.worker is not None and not suite.worker.join(_GRACE):
-                raise BakeError("the run that was cancelled is still ending", "try again in a moment")
+            self._require_ended("run")
             dependencies.require()
             from ..evaluate.stability import chosen  # needs embreex, without which the add-on still registers
             from ..jobs.stability import run_stability
@@ -135,20 +97,6 @@ class RTGI_OT_stability(bpy.types.Operator):
             self.report({"INFO"}, f"{len(report.results)} figures within their bounds. See the text {_TEXT!r} and {report.out}")
         return {"FINISHED"}
 
-    def _show(self, context, report: Report) -> None:
-        stopping = suite.worker.progress.cancelled
-        context.workspace.status_text_set("RTGI: cancelling…" if stopping else f"RTGI: {report.text}  |  Esc to cancel")
-
-    def _clean_up(self, context) -> None:
-        if self._timer is not None:
-            context.window_manager.event_timer_remove(self._timer)
-            self._timer = None
-        for workspace in bpy.data.workspaces:  # the user may have gone to another since
-            with context.temp_override(workspace=workspace):
-                workspace.status_text_set(None)
-
-    _timer = None
-
 
 class RTGI_PT_stability(bpy.types.Panel):
     """The stability suite's button."""
@@ -182,7 +130,7 @@ def unregister() -> None:
     """Stop a running test, give it a moment to end, and take everything out."""
     if suite.worker is not None:
         suite.worker.cancel()
-        suite.worker.join(_GRACE)
+        suite.worker.join(GRACE)
         suite.worker = None
     for cls in reversed(_CLASSES):
         bpy.utils.unregister_class(cls)
