@@ -50,8 +50,8 @@ class LookupSettings:
 class GridLookup:
     """One ``ProbeGrid`` made ready for reading: dilated, deringed if asked for, positions and distances laid out flat.
 
-    ``centre`` (3,) float64 is the volume's [m], and ``positions`` (p, 3) float32 the probes' from there, offsets included; ``live``
-    (p,) bool tells which hold light; ``coefficients`` (p, k, 3) float32 are SH of radiance; ``moments`` (p·(T + 2)², 2) float32
+    ``centre`` (3,) float64 is the volume's [m], and ``positions`` (p, 3) float32 the probes' from there, offsets included (``offset_world``
+    (nz, ny, nx, 3)); ``live`` (p,) bool tells which hold light; ``coefficients`` (p, k, 3) float32 are SH of radiance; ``moments`` (p·(T + 2)², 2) float32
     mean and mean squared distance [m] in bordered octahedral tiles of ``tile`` T; ``bias`` [m] is the one along normals.
     """
 
@@ -64,6 +64,7 @@ class GridLookup:
         self.centre = np.asarray(grid.volume.world_from_local, np.float64)[:3, 3]
         points = lattice.lattice_points(grid.volume.world_from_local, grid.volume.resolution) - self.centre
         self.positions = (points + grid.offset_world).reshape(-1, 3).astype(np.float32)
+        self.offset_world = grid.offset_world
         self.live = live_probes(grid).ravel()
         sh = dilate(grid).sh
         self.coefficients = (dering(sh) if settings.reconstruction == "deringed" else sh).reshape(-1, *sh.shape[3:])

@@ -1,0 +1,110 @@
+"""A bundle made ready for an engine's shader: what our own lookup reads, along the engine's axes.
+
+The lookup (`techniques/probes/lookup.py`) needs what a shader cannot make at run time: probes inside geometry filled from their
+neighbours, coefficients deringed as much as each probe needs, tiles with a border. That is done here once, so that an engine's
+irradiance equals ours but for the rounding of its textures.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...errors import BakeError
+from ...numerics import sh
+from ...techniques import ProbeGrid
+from ...techniques.probes.field import ProbeField
+from ...techniques.probes.lookup import GridLookup
+from ..bundle import Bundle
+from ..names import folder_names
+from .axes import Axes
+
+# What engines' formats and shaders hold: nine coefficients.
+ORDER = 2
+HALF_MAX = 65504.0
+
+
+@dataclass(frozen=True, eq=False)
+class ExportVolume:
+    """One volume, arrays indexed [z, y, x] as in the bundle; lattice axes stay the volume's own.
+
+    ``folder`` is a name that every file system takes. ``world_from_local`` (4, 4) float64, ``centre`` (3,) float64 and ``bias`` are
+    in the engine's axes and units. ``sh`` (nz, ny, nx, 9, 3) float32: radiance, deringed and dilated, engine axes. ``offset``
+    (nz, ny, nx, 3) float32: from lattice point to probe, engine axes and units. ``live`` (nz, ny, nx) bool: probes that hold
+    light. ``moments`` (nz, ny, nx, T + 2, T + 2, 2) float32: mean and mean squared distance in engine units, tiles of the bundle's
+    octahedral map with a border.
+    """
+
+    name: str
+    folder: str
+    resolution: tuple[int, int, int]
+    world_from_local: np.ndarray
+    centre: np.ndarray
+    bias: float
+    sh: np.ndarray
+    offset: np.ndarray
+    live: np.ndarray
+    moments: np.ndarray
+
+    @property
+    def tile(self) -> int:
+        """Texels T along a side of a tile, without its border."""
+        return self.moments.shape[3] - 2
+
+    @property
+    def lattice_from_offset(self) -> np.ndarray:
+        """(4, 4) float64: lattice coordinates (probe i at i) of points given from the volume's centre."""
+        half = 0.5 * np.asarray(self.resolution, np.float64)
+        matrix = np.eye(4)
+        matrix[:3, :3] = half[:, None] * np.linalg.inv(self.world_from_local[:3, :3])
+        matrix[:3, 3] = half - 0.5
+        return matrix
+
+    @property
+    def offset_from_lattice(self) -> np.ndarray:
+        """(4, 4) float64: points from the volume's centre of lattice coordinates."""
+        return np.linalg.inv(self.lattice_from_offset)
+
+
+def engine_field(bundle: Bundle) -> ProbeField:
+    """The bundle's light as engines hold it, bands above the second left out and missing ones zero: what exports equal."""
+    return ProbeField(tuple(_of_order(grid) for grid in bundle.grids), includes_direct=bundle.field.includes_direct)
+
+
+def notes_on_order(bundle: Bundle) -> list[str]:
+    """A note for each volume of an order that engines do not hold."""
+    return [f"volume {grid.volume.name}: bands above the second of its order {grid.order} are left out"
+            for grid in bundle.grids if grid.order > ORDER]
+
+
+def export_volumes(field: ProbeField, axes: Axes) -> tuple[ExportVolume, ...]:
+    """The volumes of an ``engine_field``, finest cells first: the order in which they are blended."""
+    folders = folder_names([lookup.volume.name for lookup in field.lookups])
+    return tuple(_export_volume(lookup, folder, axes) for lookup, folder in zip(field.lookups, folders, strict=True))
+
+
+def to_half(values: np.ndarray, what: str) -> np.ndarray:
+    """``values`` as float16. Raises BakeError naming ``what`` if any is beyond what halves hold."""
+    if np.abs(values).max(initial=0.0) > HALF_MAX:
+        raise BakeError(f"{what} is brighter than half floats hold ({HALF_MAX:.0f} W/(sr m^2))",
+                        "scale the scene's lights down and raise the engine's exposure by as much")
+    return np.asarray(values).astype(np.float16)
+
+
+def _export_volume(lookup: GridLookup, folder: str, axes: Axes) -> ExportVolume:
+    nx, ny, nz = (int(count) for count in lookup.volume.resolution)
+    width = lookup.tile + 2
+    moments = lookup.moments.reshape(nz, ny, nx, width, width, 2) * np.float32([axes.scale, axes.scale**2])
+    return ExportVolume(
+        name=lookup.volume.name, folder=folder, resolution=(nx, ny, nz),
+        world_from_local=axes.matrix(lookup.volume.world_from_local),
+        centre=axes.vectors(lookup.centre), bias=float(lookup.bias) * axes.scale,
+        sh=axes.harmonics(lookup.coefficients).reshape(nz, ny, nx, -1, 3), offset=axes.vectors(lookup.offset_world),
+        live=lookup.live.reshape(nz, ny, nx), moments=moments)
+
+
+def _of_order(grid: ProbeGrid) -> ProbeGrid:
+    count = sh.coefficient_count(ORDER)
+    coefficients = np.zeros((*grid.sh.shape[:3], count, 3), np.float32)
+    kept = min(count, grid.sh.shape[3])
+    coefficients[..., :kept, :] = grid.sh[..., :kept, :]
+    return replace(grid, sh=coefficients)
