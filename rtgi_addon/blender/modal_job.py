@@ -3,7 +3,7 @@
 import bpy
 
 from ..errors import BakeError
-from .session import redraw
+from .session import redraw, redraw_progress
 from .worker import Report
 
 _TICK = 0.1
@@ -34,6 +34,7 @@ class ModalJob:
         self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
         context.window_manager.modal_handler_add(self)
         self.job.worker.start()
+        redraw()
         return {"RUNNING_MODAL"}
 
     def modal(self, context, event):
@@ -65,7 +66,7 @@ class ModalJob:
     def _show(self, context, report: Report) -> None:
         stopping = self.job.worker.progress.cancelled
         context.workspace.status_text_set("RTGI: cancelling…" if stopping else f"RTGI: {report.text}  |  Esc to cancel")
-        redraw()
+        redraw_progress()
 
     def _clean_up(self, context) -> None:
         if self._timer is not None:

@@ -7,7 +7,7 @@ import bpy
 
 from ..errors import BakeError
 from .bake_job import check, fitted_volume, last_bake_of, prepare, record
-from .session import redraw, session
+from .session import redraw, redraw_progress, session
 from .worker import BakeWorker, Report, duration
 
 _TICK = 0.1
@@ -58,6 +58,7 @@ class RTGI_OT_bake(bpy.types.Operator):
         manager.modal_handler_add(self)
         worker.start()
         self._show(context, worker.report)
+        redraw()
         return {"RUNNING_MODAL"}
 
     def modal(self, context, event):
@@ -120,7 +121,7 @@ class RTGI_OT_bake(bpy.types.Operator):
         stopping = session.worker.progress.cancelled
         context.window_manager.progress_update(100 * report.fraction)
         context.workspace.status_text_set("RTGI: cancelling…" if stopping else f"RTGI: {report.text}  |  Esc to cancel")
-        redraw()
+        redraw_progress()
 
     def _clean_up(self, context) -> None:
         manager = context.window_manager

@@ -77,3 +77,14 @@ def redraw() -> None:
             for area in window.screen.areas:
                 if area.type in {"VIEW_3D", "PROPERTIES"}:
                     area.tag_redraw()
+
+
+def redraw_progress() -> None:
+    """Draw the sidebars again, and nothing else: a viewport drawn ten times a second would slow down what it waits for."""
+    for manager in bpy.data.window_managers:
+        for window in manager.windows:
+            for area in window.screen.areas:
+                if area.type == "VIEW_3D":
+                    for region in area.regions:
+                        if region.type == "UI":
+                            region.tag_redraw()
