@@ -23,7 +23,7 @@ OWNERS = {
     "bpy": {"blender"}, "_cycles": {"blender"}, "bpy_extras": {"blender"}, "bmesh": {"blender"}, "addon_utils": {"blender"},
     "bpy_types": {"blender"},
     "mathutils": {"blender", "transport"}, "gpu": {"preview"}, "gpu_extras": {"preview"}, "blf": {"preview"},
-    "matplotlib": {"evaluate"}, "OpenEXR": {"exchange"}, "embreex": {"transport"},
+    "matplotlib": {"evaluate"}, "embreex": {"transport"},
 }
 # Heavy, and not there in Blender: imported inside the function that draws.
 LATE = {"matplotlib"}
@@ -110,7 +110,7 @@ def test_imports_go_down_and_outside_packages_have_one_owner():
     ("jobs.bake", "if True:\n    import bpy"),
     ("errors", "from . import numerics"),
     ("blender.overlay", "import gpu"),
-    ("transport.rays", "import OpenEXR"),
+    ("exchange.exr", "import OpenEXR"),
     ("evaluate.chart", "import matplotlib.pyplot as plt"),
     ("numerics.sh", "import scipy.special"),
     ("exchange.bundle", "from .. import __main__"),

@@ -232,7 +232,7 @@ def _read_volume(bundle: Path, entry: dict) -> ProbeGrid:
         planes, _ = read_exr(bundle / name)
         if set(planes) != set(names):
             raise BakeError(f"{bundle / name} has channels {', '.join(sorted(planes))} instead of {', '.join(names)}", RESTORE)
-        sheet = np.stack([planes[letter] for letter in names], axis=-1)
+        sheet = np.stack([planes[letter] for letter in names], axis=-1, dtype=np.float32)
         if finite and not np.isfinite(sheet).all():
             raise BakeError(f"{bundle / name} holds values that are not finite", RESTORE)
         try:

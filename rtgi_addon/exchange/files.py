@@ -19,14 +19,9 @@ _REMEDIES = {
 }
 
 
-def disk_error(path, error: Exception, doing: str = "write") -> BakeError:
-    """The BakeError for a failed file operation: names ``path``, the system's own cause and its remedy.
-
-    Libraries that throw the errno away (OpenEXR raises RuntimeError) still quote the system's text; the cause is found in it.
-    """
-    code = getattr(error, "errno", None)
-    if code is None:
-        code = next((known for known in _REMEDIES if os.strerror(known) in str(error)), None)
+def disk_error(path, error: OSError, doing: str = "write") -> BakeError:
+    """The BakeError for a failed file operation: names ``path``, the system's own cause and its remedy."""
+    code = error.errno
     reason = os.strerror(code) if code is not None else " ".join(str(error).split())
     return BakeError(f"cannot {doing} {path}, {reason[:1].lower()}{reason[1:]}", _REMEDIES.get(code, "check the disk"))
 

@@ -96,7 +96,8 @@ def _coefficient(path: Path, grid: LpvGrid, tiles: flipbook.Tiles) -> np.ndarray
     if set(planes) != set("RGB"):
         raise BakeError(f"{path} has channels {', '.join(sorted(planes))} instead of R, G, B", RESTORE)
     try:
-        sheet = flipbook.from_sheet(np.stack([planes[letter] for letter in "RGB"], axis=-1), grid.resolution, tiles)
+        sheet = np.stack([planes[letter] for letter in "RGB"], axis=-1, dtype=np.float32)
+        volume = flipbook.from_sheet(sheet, grid.resolution, tiles)
     except ValueError as error:
         raise BakeError(f"{path} has the wrong size, {error}", RESTORE) from error
-    return np.ascontiguousarray(np.moveaxis(sheet, -1, 0))
+    return np.ascontiguousarray(np.moveaxis(volume, -1, 0))

@@ -1,8 +1,4 @@
-"""Whose words reach the user: ours. Blender, its importers and OpenEXR print on both streams as they please.
-
-(OpenEXR's wheel calls into the older OpenEXRCore that a real Blender has loaded already, which complains on stderr about a
-compression level it cannot set, and goes on.)
-"""
+"""Whose words reach the user: ours. Blender and its importers print on both streams as they please."""
 
 import os
 import sys
