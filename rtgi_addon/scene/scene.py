@@ -67,13 +67,15 @@ class World:
 class ProbeVolume:
     """A Light Probe Volume: the box local [−1, 1]³ under ``world_from_local`` (4, 4) float64, ``resolution`` (x, y, z) samples
     placed at cell centres. ``fitted`` tells one made up for a file that has none. ``settings`` holds the object's own
-    overrides of the technique's settings (name → value)."""
+    overrides of the technique's settings (name → value). ``wanted`` (nz, ny, nx) bool tells the probes that are worth rays (None:
+    all); the others stay in the lattice with validity 0, as if inside geometry."""
 
     name: str
     world_from_local: np.ndarray
     resolution: tuple[int, int, int]
     fitted: bool = False
     settings: dict = field(default_factory=dict)
+    wanted: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)

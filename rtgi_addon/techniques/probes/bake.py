@@ -50,12 +50,7 @@ class ProbeBake:
         progress.stage("placement")
         self.placement: Placement = place(context, volumes, settings.virtual_offset, progress.span(0.0, 0.02))
         self._check_placement()
-        refine = settings.target / 0.01
-        texels = TEXELS / min(refine, np.sqrt(refine)) * (MANY_LAMPS if context.lamps.count > ALL_SOURCES else 1.0)
-        size = settings.texel_size or texel_size(context, volumes, texels)
-        layout = TexelLayout(context.geometry, Focus(*focus(volumes), size))
-        rays = settings.cache_rays or int(np.clip(CACHE_RAYS * 2 ** round(np.log2(1.0 / refine)), 32, 1024))
-        self.cache = SurfaceCache(context, layout, seed, rays, smoothness=float(np.clip(SMOOTHNESS * refine, 0.01, 0.2)))
+        self.cache = surface_cache(context, volumes, settings, seed)
         self.gatherer = Gatherer(context, self.cache, self.placement, settings, seed)
         count = len(self.placement.positions)
         self.model = ErrorModel(count, sh.coefficient_count(settings.order))
@@ -237,11 +232,30 @@ class ProbeBake:
     def _visibility(self) -> np.ndarray:
         """Mean and mean squared distance (p, T², 2) after the last round; a cell that no ray fell into takes a mean of those around
         it."""
-        directions = octahedral.texel_directions(self.settings.visibility_resolution).reshape(-1, 3)
-        around = (np.maximum(directions @ directions.T, 0) ** 64 * 1e-4).astype(np.float32)
-        weight = self._distance_weight + self._distance_weight @ around
-        sums = self._distance + np.matmul(around, self._distance)
-        return sums / np.maximum(weight, 1e-30)[:, :, None]
+        return mean_distances(self._distance, self._distance_weight, self.settings.visibility_resolution)
+
+
+def mean_distances(sums: np.ndarray, weight: np.ndarray, resolution: int) -> np.ndarray:
+    """Mean and mean squared distance (p, T², 2) from ``sums`` (p, T², 2) over the rays in each cell of a tile of ``resolution`` T
+    and their numbers ``weight`` (p, T²)."""
+    directions = octahedral.texel_directions(resolution).reshape(-1, 3)
+    around = (np.maximum(directions @ directions.T, 0) ** 64 * 1e-4).astype(np.float32)
+    return (sums + np.matmul(around, sums)) / np.maximum(weight + weight @ around, 1e-30)[:, :, None]
+
+
+def surface_cache(context: LightContext, volumes: tuple[ProbeVolume, ...], settings: ProbeSettings, seed: int) -> SurfaceCache:
+    """The empty surface cache for a bake of ``volumes``."""
+    refine = settings.target / 0.01
+    texels = TEXELS / min(refine, np.sqrt(refine)) * (MANY_LAMPS if context.lamps.count > ALL_SOURCES else 1.0)
+    size = settings.texel_size or texel_size(context, volumes, texels)
+    layout = TexelLayout(context.geometry, Focus(*focus(volumes), size))
+    rays = settings.cache_rays or cache_rays(settings)
+    return SurfaceCache(context, layout, seed, rays, smoothness=float(np.clip(SMOOTHNESS * refine, 0.01, 0.2)))
+
+
+def cache_rays(settings: ProbeSettings) -> int:
+    """Rays from each texel of the surface cache that go with the target error."""
+    return int(np.clip(CACHE_RAYS * 2 ** round(np.log2(0.01 / settings.target)), 32, 1024))
 
 
 def focus(volumes: tuple[ProbeVolume, ...]) -> tuple[np.ndarray, float]:

@@ -50,9 +50,10 @@ class LookupSettings:
 class GridLookup:
     """One ``ProbeGrid`` made ready for reading: dilated, deringed if asked for, positions and distances laid out flat.
 
-    ``centre`` (3,) float64 is the volume's [m], and ``positions`` (p, 3) float32 the probes' from there, offsets included (``offset_world``
-    (nz, ny, nx, 3)); ``live`` (p,) bool tells which hold light; ``coefficients`` (p, k, 3) float32 are SH of radiance; ``moments`` (p·(T + 2)², 2) float32
-    mean and mean squared distance [m] in bordered octahedral tiles of ``tile`` T; ``bias`` [m] is the one along normals.
+    ``centre`` (3,) float64 is the volume's [m], and ``positions`` (p, 3) float32 the probes' from there, moved as ``offset_world``
+    (nz, ny, nx, 3) says; ``live`` (p,) bool tells which hold light; ``coefficients`` (p, k, 3) float32 are SH of radiance;
+    ``moments`` (p·(T + 2)², 2) float32 mean and mean squared distance [m] in bordered octahedral tiles of ``tile`` T; ``bias`` [m]
+    is the one along normals.
     """
 
     def __init__(self, grid: ProbeGrid, settings: LookupSettings):
@@ -98,8 +99,7 @@ class GridLookup:
 
     def weights(self, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Flat probe indices (n, 8) and their weights (n, 8) float32, which sum to 1."""
-        position = lattice.lattice_from_world(self.volume.world_from_local, self.volume.resolution, points)
-        index, trilinear = lattice.trilinear(position, self.volume.resolution)
+        index, trilinear = self.neighbours(points)
         normals = np.asarray(normals, np.float32)
         relative = (np.asarray(points, np.float64) - self.centre).astype(np.float32)
         seen = np.ones_like(trilinear)
@@ -111,6 +111,11 @@ class GridLookup:
         seen = np.where(seen < _CRUSH_BELOW, seen**3 / _CRUSH_BELOW**2, seen)
         weight = trilinear * (np.where(self.live[index], seen + _UNSEEN_FLOOR, np.float32(0.0)) + _DILATED_FLOOR)
         return index, weight / weight.sum(axis=1, keepdims=True)
+
+    def neighbours(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Rows (n, 8) of the probes about each of ``points`` (n, 3) in this lookup's arrays, and their trilinear weights (n, 8)."""
+        position = lattice.lattice_from_world(self.volume.world_from_local, self.volume.resolution, points)
+        return lattice.trilinear(position, self.volume.resolution)
 
     def _blended(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         index, weight = self.weights(points, normals)

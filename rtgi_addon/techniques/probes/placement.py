@@ -48,16 +48,32 @@ class Placement:
 
 
 def place(context: LightContext, volumes: tuple[ProbeVolume, ...], virtual_offset: bool, progress: Progress) -> Placement:
-    """Find out which probes are inside solids, and move those that can be moved."""
-    points, reach, step = [], [], []
-    for volume in volumes:
-        axes = np.linalg.norm(cell_axes(volume.world_from_local, volume.resolution), axis=0)
-        lattice = lattice_points(volume.world_from_local, volume.resolution).reshape(-1, 3)
-        points.append(lattice)
-        reach.append(np.full(len(lattice), 1.5 * np.linalg.norm(axes)))
-        step.append(np.full(len(lattice), axes.min()))
-    lattice = np.concatenate(points).astype(np.float32)
-    step = np.concatenate(step).astype(np.float32)
+    """Find out which probes are inside solids, and move those that can be moved. Probes that nobody wants count as inside."""
+    points = [lattice_points(volume.world_from_local, volume.resolution).reshape(-1, 3) for volume in volumes]
+    wanted = [np.ones(len(lattice), bool) if volume.wanted is None else np.asarray(volume.wanted, bool).reshape(-1)
+              for volume, lattice in zip(volumes, points, strict=True)]
+    owner = np.repeat(np.arange(len(volumes)), [len(lattice) for lattice in points])
+    lattice, rows = np.concatenate(points), np.flatnonzero(np.concatenate(wanted))
+    placed = place_points(context, volumes, lattice[rows], owner[rows], virtual_offset, progress)
+    if len(rows) == len(lattice):
+        return placed
+
+    def whole(part, rest):
+        array = np.full((len(lattice), *part.shape[1:]), rest, part.dtype)
+        array[rows] = part
+        return array
+
+    offset = whole(placed.offset, 0.0)
+    return Placement(lattice.astype(np.float32) + offset, offset, whole(placed.validity, 0.0), whole(placed.measured, False),
+                     whole(placed.reach, 0.0))
+
+
+def place_points(context: LightContext, volumes: tuple[ProbeVolume, ...], points: np.ndarray, owner: np.ndarray,
+                 virtual_offset: bool, progress: Progress) -> Placement:
+    """The same for some lattice ``points`` (p, 3) alone, each of the volume ``owner`` (p,)."""
+    axes = np.stack([np.linalg.norm(cell_axes(volume.world_from_local, volume.resolution), axis=0) for volume in volumes])
+    lattice = points.astype(np.float32)
+    step, reach = axes.min(axis=1)[owner].astype(np.float32), (1.5 * np.linalg.norm(axes, axis=1))[owner].astype(np.float32)
     solids = Solids(context.scene, context.geometry, context.surfaces)
     pilot = _pilot(context, solids, lattice, progress)
     offset = np.zeros_like(lattice)
@@ -66,7 +82,7 @@ def place(context: LightContext, volumes: tuple[ProbeVolume, ...], virtual_offse
     if virtual_offset:
         _leave_solids(context, solids, lattice, step, pilot, offset, measured, progress)
         _leave_surfaces(context, lattice, step, offset, measured, progress)
-    return Placement(lattice + offset, offset, pilot.validity, measured, np.concatenate(reach).astype(np.float32))
+    return Placement(lattice + offset, offset, pilot.validity, measured, reach)
 
 
 class _Pilot(NamedTuple):
