@@ -1,0 +1,146 @@
+// The model of this export, if it has one, in the light of its probes; else white balls where the probes are, over a floor.
+
+import * as THREE from 'three';
+import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
+import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
+import { RTGIProbeLoader } from './rtgi/RTGIProbeVolumes.js';
+
+const renderer = new THREE.WebGLRenderer({ antialias: true });
+renderer.shadowMap.enabled = true;
+renderer.toneMapping = THREE.AgXToneMapping;
+document.body.append(renderer.domElement);
+const scene = new THREE.Scene();
+
+const demo = await (await fetch('demo.json')).json();
+const probes = await new RTGIProbeLoader().loadAsync('probes.json');
+const gltf = demo.model ? await new GLTFLoader().loadAsync(demo.model) : null;
+scene.add(probes);
+
+const bounds = new THREE.Box3();
+const cellSizes = [];
+for (const { worldFromLocal, resolution } of probes.volumes) {
+  const matrix = new THREE.Matrix4().fromArray(worldFromLocal);
+  const size = new THREE.Vector3().setFromMatrixScale(matrix);
+  bounds.union(new THREE.Box3(new THREE.Vector3(-1, -1, -1), new THREE.Vector3(1, 1, 1)).applyMatrix4(matrix));
+  cellSizes.push(Math.min(...resolution.map((count, axis) => 2 * size.getComponent(axis) / count)));
+}
+
+// One ball for each probe that holds light, in the light at its own surface.
+function makeBalls() {
+  const places = [];
+  probes.forEachProbe((position, live, volume) => {
+    if (live) {
+      places.push(new THREE.Matrix4().makeScale(...Array(3).fill(0.12 * cellSizes[volume])).setPosition(position));
+    }
+  });
+  const balls = new THREE.InstancedMesh(new THREE.SphereGeometry(1, 24, 16), new THREE.MeshLambertMaterial(), places.length);
+  places.forEach((matrix, i) => balls.setMatrixAt(i, matrix));
+  return balls;
+}
+
+function makeFloor() {
+  const size = bounds.getSize(new THREE.Vector3());
+  const floor = new THREE.Mesh(new THREE.PlaneGeometry(1.2 * size.x, 1.2 * size.z).rotateX(-Math.PI / 2),
+    new THREE.MeshLambertMaterial({ color: 0xbbbbbb, side: THREE.DoubleSide }));
+  return floor.translateY(bounds.min.y).translateX((bounds.min.x + bounds.max.x) / 2).translateZ((bounds.min.z + bounds.max.z) / 2);
+}
+
+// Lamps of the model: already in the probes, or ours to draw, with shadows.
+function prepareLamp(light, radius) {
+  light.visible = !probes.includesDirect;
+  light.castShadow = Boolean(light.shadow);
+  if (light.isDirectionalLight) {
+    const direction = light.getWorldPosition(new THREE.Vector3()).sub(light.target.getWorldPosition(new THREE.Vector3())).normalize();
+    const centre = bounds.getCenter(new THREE.Vector3());
+    light.shadow.camera = new THREE.OrthographicCamera(-radius, radius, radius, -radius, 0, 4 * radius);
+    light.target.position.copy(light.target.parent.worldToLocal(centre.clone()));
+    light.position.copy(light.parent.worldToLocal(centre.addScaledVector(direction, 2 * radius)));
+  }
+  if (light.shadow) {
+    light.shadow.mapSize.set(2048, 2048);
+    light.shadow.normalBias = 0.01 * radius;
+  }
+}
+
+const balls = makeBalls();
+balls.visible = !gltf;
+scene.add(balls);
+if (gltf) {
+  scene.add(gltf.scene);
+  bounds.setFromObject(gltf.scene);
+  gltf.scene.updateMatrixWorld(true);
+  const radius = bounds.getBoundingSphere(new THREE.Sphere()).radius;
+  gltf.scene.traverse((object) => {
+    object.castShadow = object.receiveShadow = Boolean(object.isMesh);
+    if (object.isLight) {
+      prepareLamp(object, radius);
+    }
+  });
+} else {
+  scene.add(makeFloor());
+}
+probes.apply(scene);
+
+// The model's own camera, else one that sees all.
+const camera = new THREE.PerspectiveCamera(45, 1, 0.01, 1000);
+const sphere = bounds.getBoundingSphere(new THREE.Sphere());
+const given = gltf?.cameras.find((other) => other.isPerspectiveCamera);
+const target = sphere.center.clone();
+if (given) {
+  given.matrixWorld.decompose(camera.position, camera.quaternion, new THREE.Vector3());
+  camera.fov = given.fov;
+  const forward = new THREE.Vector3(0, 0, -1).applyQuaternion(camera.quaternion);
+  target.copy(camera.position).addScaledVector(forward, Math.max(target.sub(camera.position).dot(forward), 0.1 * sphere.radius));
+} else {
+  camera.position.copy(target).add(new THREE.Vector3(1, 0.6, 1.6).setLength(2.6 * sphere.radius));
+}
+camera.near = sphere.radius / 200;
+camera.far = 20 * sphere.radius;
+const controls = new OrbitControls(camera, renderer.domElement);
+controls.target.copy(target);
+controls.update();
+
+// An exposure that shows a surface of medium reflectance, in the probes' average light, as medium grey.
+function exposureStops() {
+  const sh = new THREE.SphericalHarmonics3(), light = new THREE.Color();
+  let sum = 0, count = 0;
+  probes.forEachProbe((position, live) => {
+    if (live && count < 256) {
+      probes.radiance(position, sh);
+      light.setRGB(...sh.coefficients[0].toArray());
+      sum += 0.2820948 * (0.2126 * light.r + 0.7152 * light.g + 0.0722 * light.b);
+      count++;
+    }
+  });
+  return sum > 0 ? Math.log2(0.6 * count / sum) : 0;
+}
+
+const form = document.querySelector('form');
+const { exposure, intensity, balls: showBalls } = form.elements;
+exposure.value = exposureStops();
+showBalls.checked = balls.visible;
+form.oninput = () => {
+  renderer.toneMappingExposure = 2 ** exposure.value;
+  probes.intensity = Number(intensity.value);
+  balls.visible = showBalls.checked;
+};
+form.oninput();
+document.getElementById('info').textContent = probes.volumes.map(({ name, resolution }) => `${name}: ${resolution.join(' x ')}`).join('; ');
+form.hidden = false;
+
+function resize() {
+  renderer.setPixelRatio(window.devicePixelRatio);
+  renderer.setSize(window.innerWidth, window.innerHeight);
+  camera.aspect = window.innerWidth / window.innerHeight;
+  camera.updateProjectionMatrix();
+}
+window.addEventListener('resize', resize);
+resize();
+renderer.setAnimationLoop(() => {
+  controls.update();
+  renderer.render(scene, camera);
+  document.documentElement.dataset.state ??= 'ready';
+});
+document.getElementById('message').textContent = '';
+// For the browser's console.
+window.rtgi = { THREE, scene, camera, renderer, probes, balls };
