@@ -4,8 +4,14 @@ Importing this package imports neither Blender nor any dependency, so light tran
 """
 
 
+from importlib.util import find_spec
+
+
 def register() -> None:
-    """Add properties, operators, panels, handlers and the `rtgi` command to Blender."""
+    """Add properties, operators, panels, handlers and the `rtgi` command to Blender. Raises ImportError without numpy."""
+    if find_spec("numpy") is None:  # part of every Blender from blender.org; distributions may leave it out
+        raise ImportError("RTGI needs numpy, which this Blender's Python lacks: install it (Debian: sudo apt install "
+                          "python3-numpy) and restart Blender")
     from .blender import registration
 
     registration.register()

@@ -8,10 +8,10 @@ import bpy
 import numpy as np
 
 from ..errors import BakeError
+from ..jobs.bake import bake_scene
 from ..progress import Progress
 from ..scene import ProbeVolume
 from ..scene.checks import check_scene
-from . import dependencies
 from .extract import extract_scene
 from .extract.volumes import fit_volume
 from .fingerprint import fingerprint
@@ -23,9 +23,6 @@ from .worker import KernelsOnMainThread
 
 def prepare(context) -> Callable[[Progress], object]:
     """Read the scene and return ``bake(progress) -> BakeSummary``, which touches Blender no more. Raises BakeError."""
-    dependencies.require()
-    from ..jobs.bake import bake_scene  # needs OpenEXR, without which the add-on still registers
-
     scene = context.scene
     technique, settings = scene_settings(scene)
     output = output_folder(scene.rtgi.output)

@@ -9,8 +9,8 @@ import bpy
 
 from ..errors import BakeError
 from ..evaluate.chart_data import Chart
+from ..jobs.chart import chart_scene
 from ..progress import Progress
-from . import dependencies
 from .bake_job import output_folder
 from .extract import extract_scene
 from .modal_job import GRACE, ModalJob
@@ -74,8 +74,6 @@ class RTGI_OT_chart(ModalJob, bpy.types.Operator):
         scene = context.scene
         try:
             self._require_ended("chart")
-            dependencies.require()
-            from ..jobs.chart import chart_scene  # needs OpenEXR, without which the add-on still registers
             charts.folder = output_folder(scene.rtgi.output).with_name(output_folder(scene.rtgi.output).name + "_chart")
             extracted = extract_scene(context=context)
             reference = None

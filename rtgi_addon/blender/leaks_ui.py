@@ -4,8 +4,9 @@ import bpy
 import numpy as np
 
 from ..errors import BakeError
+from ..evaluate.leaks import Cause, find_leaks
 from ..progress import Progress
-from . import dependencies
+from ..transport.context import LightContext
 from .modal_job import GRACE, ModalJob
 from .panels import draw_lines
 from .session import redraw, session
@@ -63,12 +64,9 @@ class RTGI_OT_find_leaks(ModalJob, bpy.types.Operator):
         """Whether there is now a worker that can run; a reason against it was reported."""
         try:
             self._require_ended("search")
-            dependencies.require()
         except BakeError as error:
             self.report({"ERROR"}, str(error))
             return False
-        from ..evaluate.leaks import find_leaks
-        from ..transport.context import LightContext
         key = context.scene.name, context.scene.rtgi.technique
         baked, points = session.baked[key], self.points
 
@@ -124,7 +122,6 @@ class RTGI_PT_leaks(bpy.types.Panel):
 
 def at_receiver(leak_map, row: int) -> str:
     """What a LeakMap says of one receiver."""
-    from ..evaluate.leaks import Cause
     cause = Cause(int(leak_map.cause[row]))
     off = f"{100.0 * leak_map.error[row]:+.0f}%"
     return off if cause is Cause.NONE else f"{off}, {cause.text}"

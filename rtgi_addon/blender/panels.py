@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 
 from ..techniques import registry
-from . import dependencies
+from ..transport.rays import slow_rays_warning
 from .properties import GOALS, attribute, has_goal, value_type
 from .session import session
 from .worker import duration
@@ -31,18 +31,11 @@ def _sentence(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def draw_missing(layout, width: int) -> bool:
-    """Say which packages this Blender lacks; True if a bake cannot run without them."""
-    packages = dependencies.missing()
-    required = [package for package in packages if package.required]
-    shown = required or packages
-    if shown:
-        box = layout.box()
-        box.alert = bool(required)
-        for package in shown:
-            draw_lines(box, f"{package.module} is missing ({package.purpose})", width, "ERROR" if required else "INFO")
-        draw_lines(box, _sentence(dependencies.remedy(shown)), width)
-    return bool(required)
+def draw_slow_rays(layout, width: int) -> None:
+    """Say so where there is no Embree, before the user waits for a bake."""
+    warning = slow_rays_warning()
+    if warning:
+        draw_lines(layout.box(), _sentence(warning), width, "INFO")
 
 
 def draw_actions(layout, context, width: int) -> None:
@@ -111,7 +104,7 @@ class RTGI_PT_render(bpy.types.Panel):
         """Technique, when to stop, the technique's own settings."""
         layout, settings = self.layout, context.scene.rtgi
         width = context.region.width
-        draw_missing(layout, width)
+        draw_slow_rays(layout, width)
         layout.use_property_split = True
         layout.use_property_decorate = False
         column = layout.column()
@@ -191,11 +184,9 @@ class RTGI_PT_bake(bpy.types.Panel):
     def draw(self, context):
         """Volumes, Bake or its progress."""
         width = context.region.width
-        blocked = draw_missing(self.layout, width)
+        draw_slow_rays(self.layout, width)
         draw_volumes(self.layout, context, width)
-        column = self.layout.column()
-        column.enabled = not blocked
-        draw_actions(column, context, width)
+        draw_actions(self.layout.column(), context, width)
 
 
 class RTGI_PT_last_bake(bpy.types.Panel):

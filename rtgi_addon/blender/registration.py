@@ -4,7 +4,7 @@ from types import ModuleType
 
 from . import (
     chart_ui,
-    dependencies,
+    cli,
     engine,
     handlers,
     leaks_ui,
@@ -16,24 +16,16 @@ from . import (
     stability_ui,
 )
 
+_MODULES = (
+    properties, preview_settings, operators, panels, chart_ui, stability_ui, leaks_ui, preview_panels, engine, handlers, cli,
+)
 _registered: list[ModuleType] = []
-
-
-def _modules() -> list[ModuleType]:
-    """Everything, less what cannot be imported while required packages are missing: then the panels say what to install."""
-    modules = [properties, preview_settings, operators, panels, chart_ui, stability_ui, leaks_ui, preview_panels, engine, handlers]
-    if not dependencies.missing_required():
-        from . import cli
-
-        modules.append(cli)
-    return modules
 
 
 def register() -> None:
     """Register every module; if one fails, those before it are taken out again, so that a second attempt starts clean."""
-    dependencies.missing.cache_clear()
     try:
-        for module in _modules():
+        for module in _MODULES:
             module.register()
             _registered.append(module)
     except Exception:

@@ -4,8 +4,9 @@ import bpy
 
 from .. import techniques
 from ..errors import BakeError
+from ..evaluate.stability import chosen
+from ..jobs.stability import run_stability
 from ..progress import Progress
-from . import dependencies
 from .bake_job import output_folder
 from .modal_job import GRACE, ModalJob
 from .session import redraw, session
@@ -38,7 +39,8 @@ def _techniques(_self, _context):
 
 
 class RTGI_OT_stability(ModalJob, bpy.types.Operator):
-    """Bake the built-in scenes in which methods of global illumination are known to fail, and report how much ours do"""
+    """Bake this scene with its volumes and lamps moved, or the built-in scenes in which methods are known to fail, and report what \
+should not have changed"""
 
     bl_idname = "rtgi.stability"
     bl_label = "Test Stability"
@@ -47,6 +49,7 @@ class RTGI_OT_stability(ModalJob, bpy.types.Operator):
 
     technique: bpy.props.EnumProperty(name="Technique", description="Which technique is tested", items=_techniques)
     case: bpy.props.StringProperty(name="Case", description="Only the case of this name; all if empty")
+    own: bpy.props.BoolProperty(name="This Scene", default=True, description="Test this scene instead of the built-in ones")
 
     @classmethod
     def poll(cls, context):
@@ -60,12 +63,10 @@ class RTGI_OT_stability(ModalJob, bpy.types.Operator):
         """Whether there is now a worker that can run; a reason against it was reported."""
         try:
             self._require_ended("run")
-            dependencies.require()
-            from ..evaluate.stability import chosen  # needs embreex, without which the add-on still registers
-            from ..jobs.stability import run_stability
             cases = [self.case] if self.case else None
             wanted = None if self.technique == "all" else [self.technique]
-            chosen(cases, wanted)
+            scene = extract_scene(context=context) if self.own else None
+            chosen(cases, wanted, own_cases(scene) if self.own else CASES)
             output = output_folder(context.scene.rtgi.output)
             folder = output.with_name(output.name + "_stability")
         except BakeError as error:
@@ -73,7 +74,7 @@ class RTGI_OT_stability(ModalJob, bpy.types.Operator):
             return False
 
         def measure(progress: Progress):
-            return run_stability(folder, cases=cases, techniques=wanted, progress=progress)
+            return run_stability(folder, scene, cases=cases, techniques=wanted, progress=progress)
 
         suite.worker = BakeWorker(measure, on_report)
         return True
@@ -90,11 +91,15 @@ class RTGI_OT_stability(ModalJob, bpy.types.Operator):
         report = outcome.summary
         text = bpy.data.texts.get(_TEXT) or bpy.data.texts.new(_TEXT)
         text.from_string(report.to_markdown())
-        worse = [f"{result.case.name} of {result.technique}" for result in report.worse]
-        if worse:
-            self.report({"WARNING"}, f"Worse than their bounds: {', '.join(worse)}. See the text {_TEXT!r}")
+        failed = [result for result in report.results if result.verdict in (WORSE, ABOVE)]
+        listed = ", ".join(f"{result.case.name} of {result.technique}" for result in failed)
+        if not failed:
+            self.report({"INFO"}, f"{len(report.results)} figures hold. See the text {_TEXT!r} and {report.out}")
+        elif self.own:
+            self.report({"INFO"}, f"{len(failed)} of {len(report.results)} figures are above their goals: {listed}. The text "
+                                  f"{_TEXT!r} says what helps")
         else:
-            self.report({"INFO"}, f"{len(report.results)} figures within their bounds. See the text {_TEXT!r} and {report.out}")
+            self.report({"WARNING"}, f"Worse than their bounds: {listed}. See the text {_TEXT!r}")
         return {"FINISHED"}
 
 
@@ -109,10 +114,12 @@ class RTGI_PT_stability(bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        """The button for the scene's technique and the one for all of them; which text holds the report."""
+        """The buttons for this scene and for the built-in ones; which text holds the report."""
         layout = self.layout
-        layout.operator("rtgi.stability", text="Test This Technique").technique = context.scene.rtgi.technique
-        layout.operator("rtgi.stability", text="Test All").technique = "all"
+        for text, technique, own in (("Test This Scene", context.scene.rtgi.technique, True),
+                                     ("This Scene, All Techniques", "all", True), ("Built-in Scenes", "all", False)):
+            button = layout.operator("rtgi.stability", text=text)
+            button.technique, button.own = technique, own
         if _TEXT in bpy.data.texts:
             layout.label(text=_TEXT, icon="TEXT")
 

@@ -3,6 +3,8 @@
 Without an embreex wheel ``make_tracer`` falls back to Blender's BVH, and outside Blender to the numpy twin.
 """
 
+import platform
+import sys
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -17,7 +19,7 @@ from .vectors import dot
 try:
     from embreex import rtcore_scene
     from embreex.mesh_construction import TriangleMesh
-except ImportError:  # no wheel for this platform (Windows and Linux on Arm)
+except ImportError:  # no wheel for this platform (Windows and Linux on Arm), or one that this system cannot load
     rtcore_scene = None
 
 # Relative to coordinates and hit distance: some 30 float32 ulps, which covers the error of o + t·d and of the BVH's quantization.
@@ -67,12 +69,15 @@ def _without_embree(geometry: Geometry) -> Tracer:
 
 
 def slow_rays_warning() -> str | None:
-    """What to tell the user where rays do not go through Embree; None where they do."""
+    """What to tell the user where rays do not go through Embree, and what to do; None where they do."""
     if rtcore_scene is not None:
         return None
     from .bvh_tree import SLOWER
-    return (f"there is no Embree here (the package embreex): rays go through Blender's BVH, which makes bakes some {SLOWER} times "
-            "slower, and more on many cores")
+    on_arm = platform.machine().lower() in ("arm64", "aarch64") and sys.platform != "darwin"
+    remedy = ("the package does not exist for this system" if on_arm else
+              "install the extension's zip made for this system, or that package, and restart Blender")
+    return (f"there is no Embree here (the Python package embreex): rays go through Blender's BVH, which makes bakes some {SLOWER} "
+            f"times slower, and more on many cores; {remedy}")
 
 
 class EmbreeTracer:

@@ -128,11 +128,10 @@ def test_long_lines_are_wrapped_to_the_region(scene, width):
     assert (len(layout.texts) == 1) == (width == 1200)
 
 
-def test_missing_packages_are_named_with_what_to_do(scene, monkeypatch):
-    from rtgi_addon.blender import dependencies
-    for module, blocked in (("OpenEXR", True), ("embreex", False)):
-        package = next(package for package in dependencies.PACKAGES if package.module == module)
-        monkeypatch.setattr(dependencies, "missing", lambda package=package: (package,))
-        texts, _ = draw("RTGI_PT_bake", width=2000)
-        assert f"{module} is missing" in texts and f"pip install {module}" in texts
-        assert bool(dependencies.missing_required()) == blocked
+def test_without_embree_the_panels_say_what_it_costs_and_what_to_do(scene, monkeypatch):
+    from rtgi_addon.transport import rays
+    assert "Embree" not in draw("RTGI_PT_bake", width=2000)[0]
+    monkeypatch.setattr(rays, "rtcore_scene", None)
+    for panel in ("RTGI_PT_bake", "RTGI_PT_render"):
+        texts, _ = draw(panel, width=4000)
+        assert "There is no Embree here" in texts and "5 times slower" in texts and "restart Blender" in texts

@@ -1,5 +1,7 @@
 """F12 with the engine RTGI, through Blender's own render operator."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -43,7 +45,9 @@ def scene(gpu_device, empty_blend, tmp_path):
     settings = scene.render.image_settings
     if hasattr(settings, "media_type"):
         settings.media_type = "MULTI_LAYER_IMAGE"
-    settings.file_format, settings.color_depth = "OPEN_EXR_MULTILAYER", "32"
+    settings.file_format, settings.color_depth, settings.exr_codec = "OPEN_EXR_MULTILAYER", "32", "ZIP"
+    if hasattr(settings, "use_exr_interleave"):
+        settings.use_exr_interleave = True  # one part, as before 5.0
     yield scene
     scene.render.engine = "BLENDER_WORKBENCH"
     rtgi_addon.unregister()
@@ -51,13 +55,12 @@ def scene(gpu_device, empty_blend, tmp_path):
 
 def read(path, layer="ViewLayer"):
     """Pass name → (h, w, channels) of a multilayer EXR, row 0 at the top."""
-    import OpenEXR
+    from rtgi_addon.exchange.exr_codec import decode
     found = {}
-    for part in OpenEXR.File(str(path), separate_channels=True).parts:
-        for name, channel in part.channels.items():
-            where, entry, letter = name.rsplit(".", 2)
-            if where == layer:
-                found.setdefault(entry, {})[letter] = channel.pixels
+    for name, plane in decode(Path(path).read_bytes())[0].items():
+        where, entry, letter = name.rsplit(".", 2)
+        if where == layer:
+            found.setdefault(entry, {})[letter] = plane
     return {entry: np.stack([planes[letter] for letter in sorted(planes, key="RGBAXYZ".index)], axis=-1)
             for entry, planes in found.items()}
 

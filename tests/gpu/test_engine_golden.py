@@ -21,9 +21,9 @@ ROUNDING = 2e-3
 def renders(samples, out):
     """Mean pictures (h, w, 3) after every number of ``samples``, through Blender's render operator."""
     import bpy
-    import OpenEXR
 
     import rtgi_addon
+    from rtgi_addon.exchange.exr_codec import decode
     bpy.ops.wm.open_mainfile(filepath=str(ROOT / "sample_blends/cornell_box.blend"))
     rtgi_addon.register()
     scene = bpy.context.scene
@@ -36,13 +36,13 @@ def renders(samples, out):
         settings = scene.render.image_settings
         if hasattr(settings, "media_type"):
             settings.media_type = "IMAGE"
-        settings.file_format, settings.color_depth = "OPEN_EXR", "32"
+        settings.file_format, settings.color_depth, settings.exr_codec = "OPEN_EXR", "32", "ZIP"
         for count in samples:
             scene.rtgi_preview.render_samples = count
             scene.render.filepath = str(out / f"{count}.exr")
             bpy.ops.render.render(write_still=True)
-            channels = OpenEXR.File(scene.render.filepath, separate_channels=True).channels()
-            yield np.stack([channels[name].pixels for name in "RGB"], axis=-1)
+            channels, _ = decode(Path(scene.render.filepath).read_bytes())
+            yield np.stack([channels[name] for name in "RGB"], axis=-1)
     finally:
         scene.render.engine = "BLENDER_WORKBENCH"
         rtgi_addon.unregister()

@@ -6,11 +6,11 @@ from pathlib import Path
 import bpy
 
 from ...errors import BakeError
+from ...exchange.bundle import read_bundle
 from ...jobs.fingerprint import content_hash
 from ...progress import Progress
 from ...scene import Scene
 from ...techniques import Field, get
-from .. import dependencies
 from ..session import Baked, session
 
 
@@ -68,8 +68,6 @@ def forget() -> None:
 
 def _from_disk(scene, technique) -> Shown:
     nothing = Shown(None, f"Nothing baked with {technique.label}: direct light and world only")
-    if dependencies.missing_required():
-        return nothing
     for folder in bundle_folders(scene):
         manifest = folder / "bake.json"
         try:
@@ -87,7 +85,6 @@ def _from_disk(scene, technique) -> Shown:
 
 def _bundle(folder: Path) -> tuple[Shown, str]:
     """A bundle as probes, and the technique that made it ("" where it cannot be read)."""
-    from ...exchange.bundle import read_bundle  # needs OpenEXR
     try:
         bundle = read_bundle(folder)
     except BakeError as error:
