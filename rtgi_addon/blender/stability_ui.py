@@ -4,10 +4,11 @@ import bpy
 
 from .. import techniques
 from ..errors import BakeError
-from ..evaluate.stability import chosen
+from ..evaluate.stability import ABOVE, CASES, WORSE, chosen, own_cases
 from ..jobs.stability import run_stability
 from ..progress import Progress
 from .bake_job import output_folder
+from .extract import extract_scene
 from .modal_job import GRACE, ModalJob
 from .session import redraw, session
 from .worker import BakeWorker
@@ -39,8 +40,8 @@ def _techniques(_self, _context):
 
 
 class RTGI_OT_stability(ModalJob, bpy.types.Operator):
-    """Bake this scene with its volumes and lamps moved, or the built-in scenes in which methods are known to fail, and report what \
-should not have changed"""
+    """Bake this scene with its volumes and lamps moved, or built-in ones in which methods are known to fail, and report what \
+changed that should not have"""
 
     bl_idname = "rtgi.stability"
     bl_label = "Test Stability"

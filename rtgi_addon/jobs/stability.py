@@ -7,23 +7,28 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from ..errors import BakeError, Cancelled
-from ..evaluate.stability import Result, StabilityReport, chosen, draw_result, measure
+from ..evaluate.stability import CASES, Result, StabilityReport, chosen, draw_result, measure, own_cases
 from ..progress import Progress
+from ..scene import Scene
+from ..scene.checks import check_scene, require
 
 REPORT, DATA, PICTURES = "stability.md", "stability.json", "pictures"
 
 
-def run_stability(out=None, *, cases: Iterable[str] | None = None, techniques: Iterable[str] | None = None,
-                  variants: bool = True, pictures: bool = True, seed: int = 1, threads: int | None = None,
-                  progress: Progress | None = None) -> StabilityReport:
-    """Measure every chosen case for every chosen technique (None: all), with ``variants`` also without their remedies.
+def run_stability(out=None, scene: Scene | None = None, *, cases: Iterable[str] | None = None,
+                  techniques: Iterable[str] | None = None, variants: bool = True, pictures: bool = True, seed: int = 1,
+                  threads: int | None = None, progress: Progress | None = None) -> StabilityReport:
+    """Measure every chosen case for every chosen technique (None: all), with ``variants`` also without their remedies: the built-in
+    cases, or those of ``scene``.
 
     ``out`` (None: nothing is written) is a folder that gets stability.md, stability.json and, with ``pictures``, one PNG a result.
     A cancelled run writes what it has measured and raises Cancelled. Raises UsageError for unknown names, BakeError if ``out``
-    cannot be written.
+    cannot be written or ``scene`` cannot be baked.
     """
     progress = progress or Progress()
-    pairs = chosen(cases, techniques)
+    if scene is not None:
+        require(check_scene(scene))
+    pairs = chosen(cases, techniques, CASES if scene is None else own_cases(scene, threads, seed=seed))
     target = None if out is None else _prepared(out)
     tasks = [(case, technique, variant) for case, technique in pairs
              for variant in (None, *(case.variants.get(technique, ()) if variants else ()))]
@@ -32,7 +37,8 @@ def run_stability(out=None, *, cases: Iterable[str] | None = None, techniques: I
     try:
         for number, (case, technique, variant) in enumerate(tasks):
             progress.step(number / len(tasks), f"{case.name}, {technique}" + (f", {variant.name}" if variant else ""))
-            result = measure(case, technique, variant, seed=seed, threads=threads, progress=progress)
+            result = measure(case, technique, variant, seed=seed, threads=threads,
+                             progress=progress.span(number / len(tasks), (number + 1) / len(tasks)))
             if target is not None and pictures and variant is None:
                 name = f"{PICTURES}/{case.name}-{technique}.png"
                 if draw_result(result, target / name) is not None:

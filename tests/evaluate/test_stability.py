@@ -6,16 +6,20 @@ with a confidence of more than 99.9 %, also over all figures together.
 """
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from rtgi_addon.errors import Cancelled, UsageError
+from rtgi_addon.errors import BakeError, Cancelled, UsageError
 from rtgi_addon.evaluate import stability
-from rtgi_addon.evaluate.stability import CASES, HOLDS, WEAK, WORSE, Case, Limit, Result, Sample, Variant, limits, parts, suite
+from rtgi_addon.evaluate.stability import (ABOVE, CASES, HOLDS, WEAK, WORSE, Case, Limit, Result, Sample, Variant, limits, own, parts,
+                                           suite)
 from rtgi_addon.evaluate.stability.motion import flicker
+from rtgi_addon.evaluate.stability.own import OWN_NAMES, own_cases
 from rtgi_addon.jobs.stability import run_stability
 from rtgi_addon.progress import Progress
+from rtgi_addon.scene import World
 from rtgi_addon.techniques import names
 
 # What takes about a second; the others are marked slow.
@@ -147,3 +151,70 @@ def test_unknown_names_are_refused_before_anything_is_measured(tmp_path, cases, 
     with pytest.raises(UsageError, match=word):
         run_stability(tmp_path / "out", cases=cases, techniques=techniques)
     assert not (tmp_path / "out").exists()
+
+
+# ---- a user's own scene
+
+@pytest.fixture(scope="module")
+def small_room():
+    return replace(parts.room_with_block(3), source="room.blend")
+
+
+def test_an_own_scene_names_its_cases_and_leaves_out_lamps_where_there_are_none(small_room):
+    assert tuple(own_cases(small_room)) == OWN_NAMES
+    dark = replace(small_room, lights=(), world=World.constant(1.0))
+    assert set(OWN_NAMES) - set(own_cases(dark)) == {"lamp-motion"}
+
+
+@pytest.mark.parametrize(("name", "technique"), [("phase", "lpv"), ("rotation", "lpv"), ("seeds", "rsm"), ("size", "lpv"),
+                                                 ("lamp-motion", "rsm"), ("energy", "lpv"), ("leaks", "rsm"),
+                                                 pytest.param("refinement", "probes", marks=pytest.mark.slow)])
+def test_an_own_scene_is_measured(small_room, name, technique):
+    result = stability.measure(own_cases(small_room)[name], technique)
+    assert np.isfinite(result.figure) and result.figure >= 0
+    assert result.verdict == (HOLDS if result.figure <= result.case.goal else ABOVE)
+    assert result.command.startswith('python -m rtgi_addon "room.blend" stability --case ' + name)
+
+
+def test_size_does_not_matter_and_light_volumes_leak_more_than_virtual_lights(small_room):
+    cases = own_cases(small_room)
+    assert stability.measure(cases["size"], "lpv").figure < 0.002
+    assert stability.measure(cases["leaks"], "lpv").figure > stability.measure(cases["leaks"], "vpl").figure
+
+
+def test_what_refuses_an_own_scene_is_reported_and_the_rest_goes_on(small_room, tmp_path, monkeypatch):
+    def refuse(*_args, **_kwargs):
+        raise BakeError("this technique will not", "choose another")
+
+    monkeypatch.setattr(own, "find_leaks", refuse)
+    report = run_stability(tmp_path, small_room, cases=["leaks", "size"], techniques=["rsm"], pictures=False)
+    assert [result.worst.parameter for result in report.results][0] == "refused: this technique will not"
+    assert report.results[0].verdict == ABOVE and np.isfinite(report.results[1].figure)
+    text = report.to_markdown()
+    assert "visibility=true" in text and "infinite" in text and not report.worse
+
+
+def test_every_kind_of_lamp_keeps_its_light_under_a_similarity():
+    """The irradiance that a lamp gives grows with no size: intensity with its square, radiance not at all."""
+    from rtgi_addon.scene import AreaLight, SpotLight
+    from rtgi_addon.transport.context import LightContext
+    from rtgi_addon.transport.direct import lamp_irradiance
+    down, half = np.float32([0, 0, -1]), np.float32([0.2, 0, 0])
+    lamps = (AreaLight("area", np.float32([0.3, 0, 0.9]), half, np.float32([0, 0.2, 0]), down, np.full(3, 2.0, np.float32)),
+             SpotLight("spot", np.float32([-0.4, 0, 0.8]), down, np.full(3, 3.0, np.float32), 1.2, 0.3, radius=0.05,
+                       world_from_local=np.diag([1.0, 0.5, 1.0])))
+    built = replace(parts.room_with_block(2), lights=lamps)
+    turn = parts.rotation((0.3, 0.5, 1.0), 40.0)
+    grown = turn @ np.diag([7.0, 7.0, 7.0, 1.0])
+    points, normals = (np.repeat(part, 64, axis=0) for part in parts.receivers(-parts.ONE, parts.ONE, 4))
+    points = points + np.float32(1e-3) * normals
+    u = np.random.default_rng(1).random((len(points), 3), dtype=np.float32)
+
+    def lit(taken, points, normals):
+        return lamp_irradiance(LightContext(taken), points, normals, normals, u)
+
+    before, after = lit(built, points, normals), lit(parts.moved(built, grown, intensity=49.0), *parts.turned(points, normals, grown))
+    assert before.max() > 1.0
+    # The spot's disk is drawn in a frame of its own, which does not turn with the lamp: compare means of 64 samples.
+    difference = (after - before).reshape(-1, 64, 3).mean(axis=1)
+    assert np.abs(difference).mean() < 0.01 * before.mean()

@@ -25,17 +25,19 @@ class Report(Protocol):
 @dataclass(frozen=True)
 class Session:
     """What a door hands to a subcommand: ``progress`` to report to and be cancelled by, and ``read_scene`` which opens the
-    FILE (or takes the one that is open) and extracts it. Only ``read_scene`` touches Blender."""
+    FILE (or takes the one that is open) and extracts it. Only ``read_scene`` touches Blender. ``has_file`` says whether there is
+    a FILE, for those that can do without."""
 
     progress: Progress
     read_scene: Callable[[], Scene]
+    has_file: bool = True
 
 
 @dataclass(frozen=True)
 class Subcommand:
-    """One entry of the command line. ``takes_scene`` says that it works on a FILE; ``add_arguments`` declares its options;
-    ``check`` (optional) raises UsageError for options that contradict each other or a technique, before anything is opened;
-    ``run`` does the work."""
+    """One entry of the command line. ``takes_scene`` says that it works on a FILE, ``needs_scene`` that it cannot do without;
+    ``add_arguments`` declares its options; ``check`` (optional) raises UsageError for options that contradict each other or a
+    technique, before anything is opened; ``run`` does the work."""
 
     name: str
     help: str
@@ -43,3 +45,4 @@ class Subcommand:
     add_arguments: Callable[[ArgumentParser], None]
     run: Callable[[Namespace, Session], Report]
     check: Callable[[Namespace], None] | None = None
+    needs_scene: bool = True

@@ -28,10 +28,11 @@ def main_module(argv: list[str]) -> int:
         file, rest = rest[0], rest[1:]
 
     def require_file(arguments: Namespace) -> None:
-        takes_scene = SUBCOMMANDS[arguments.subcommand].takes_scene
-        if file is not None and not takes_scene:
+        subcommand = SUBCOMMANDS[arguments.subcommand]
+        if file is not None and not subcommand.takes_scene:
             raise UsageError(f"{arguments.subcommand} takes no FILE, and {file!r} stands before it", "leave it out")
-        if takes_scene and (file is None) == (arguments.imported is None):
+        files = (file is not None) + (getattr(arguments, "imported", None) is not None)
+        if subcommand.takes_scene and (files > 1 or (subcommand.needs_scene and files == 0)):
             raise UsageError(f"{arguments.subcommand} needs one file", "name a .blend, .glb or .gltf before it")
 
     with ExitStack() as stack:
@@ -40,7 +41,7 @@ def main_module(argv: list[str]) -> int:
             stack.enter_context(known_properties())
             open_file(file or arguments.imported)
 
-        return _run(rest, "python -m rtgi_addon [FILE]", read, require_file)
+        return _run(rest, "python -m rtgi_addon [FILE]", read, lambda: file is not None, require_file)
 
 
 def main_blender(argv: list[str]) -> int:
@@ -49,7 +50,11 @@ def main_blender(argv: list[str]) -> int:
         from .open_file import take_open_file
         take_open_file(arguments.imported)
 
-    return _run(list(argv), "blender -b FILE.blend --command rtgi", read)
+    def is_open() -> bool:
+        import bpy
+        return bool(bpy.data.filepath)
+
+    return _run(list(argv), "blender -b FILE.blend --command rtgi", read, is_open)
 
 
 def register() -> None:
@@ -68,8 +73,9 @@ def unregister() -> None:
         _handle = None
 
 
-def _run(argv: list[str], prog: str, open_scene: Callable[[Namespace], None], check_file=None) -> int:
-    """Parse, run and report. ``open_scene`` brings the file into Blender; ``check_file`` raises UsageError."""
+def _run(argv: list[str], prog: str, open_scene: Callable[[Namespace], None], has_file: Callable[[], bool], check_file=None) -> int:
+    """Parse, run and report. ``open_scene`` brings the file into Blender, ``has_file`` says whether there is one beside --import;
+    ``check_file`` raises UsageError."""
     try:
         arguments = build_parser(prog).parse_args(argv)
         subcommand = SUBCOMMANDS[arguments.subcommand]
@@ -96,7 +102,8 @@ def _run(argv: list[str], prog: str, open_scene: Callable[[Namespace], None], ch
 
     try:
         with _interruptible(progress):
-            report = subcommand.run(arguments, Session(progress, read_scene))
+            named = getattr(arguments, "imported", None) is not None or has_file()
+            report = subcommand.run(arguments, Session(progress, read_scene, named))
         console.close()
         streams.out.write((json.dumps(report.to_json(), indent=1) if arguments.json else report.to_text()) + "\n")
         streams.out.flush()

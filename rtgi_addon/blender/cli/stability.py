@@ -1,16 +1,20 @@
-"""`stability`: the scenes in which methods are known to fail, and how much ours do."""
+"""`stability`: what a FILE's scene does to each technique; without one, the scenes in which methods are known to fail."""
 
 import argparse
 
+from ... import techniques
 from ...errors import BakeError
 from ...evaluate.stability import CASES, StabilityReport, chosen
+from ...evaluate.stability.own import OWN_NAMES
 from ...jobs.stability import run_stability
-from .base import Session, Subcommand
+from .base import EXTRACT_SHARE, Session, Subcommand
 
 
 def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="DIR", help="a folder for stability.md, stability.json and a picture of each worst case")
-    parser.add_argument("--case", action="append", metavar="NAME", help=f"only this case; may be repeated: {', '.join(CASES)}")
+    parser.add_argument("--built-in", action="store_true", help="the built-in scenes, though there is a FILE")
+    parser.add_argument("--case", action="append", metavar="NAME",
+                        help=f"only this case; may be repeated: {', '.join(OWN_NAMES)} of a FILE; {', '.join(CASES)} without one")
     parser.add_argument("--technique", action="append", metavar="NAME", help="only this technique; may be repeated")
     parser.add_argument("--no-variants", action="store_true", help="leave out the runs without remedies")
     parser.add_argument("--no-pictures", action="store_true", help="draw nothing")
@@ -19,13 +23,20 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _check(arguments: argparse.Namespace) -> None:
-    chosen(arguments.case, arguments.technique)
+    for name in arguments.case or ():
+        if name not in CASES and name not in OWN_NAMES:
+            chosen([name])
+    for name in arguments.technique or ():
+        techniques.get(name)
 
 
 def _run(arguments: argparse.Namespace, session: Session) -> StabilityReport:
-    report = run_stability(arguments.out, cases=arguments.case, techniques=arguments.technique, variants=not arguments.no_variants,
-                           pictures=not arguments.no_pictures, seed=arguments.seed, threads=arguments.threads,
-                           progress=session.progress)
+    scene, progress = None, session.progress
+    if session.has_file and not arguments.built_in:
+        scene, progress = session.read_scene(), progress.span(EXTRACT_SHARE, 1.0)
+    report = run_stability(arguments.out, scene, cases=arguments.case, techniques=arguments.technique,
+                           variants=not arguments.no_variants, pictures=not arguments.no_pictures, seed=arguments.seed,
+                           threads=arguments.threads, progress=progress)
     if report.worse:
         names = ", ".join(f"{result.case.name} of {result.technique} ({result.figure:.3g}, bound {result.limit.bound:g})"
                           for result in report.worse)
@@ -33,5 +44,5 @@ def _run(arguments: argparse.Namespace, session: Session) -> StabilityReport:
     return report
 
 
-SUBCOMMAND = Subcommand("stability", "measure how techniques stand the scenes where methods fail", False, _add_arguments, _run,
-                        _check)
+SUBCOMMAND = Subcommand("stability", "measure how techniques stand a scene, or those in which methods fail", True, _add_arguments,
+                        _run, _check, needs_scene=False)

@@ -112,8 +112,14 @@ def _moved_light(light: Light, world_from_old: np.ndarray, scale: float, intensi
     names = {item.name for item in fields(light)}
     if "position_world" in names:
         new["position_world"] = transform_points(world_from_old, light.position_world[None])[0].astype(np.float32)
-    if "direction_world" in names:
-        new["direction_world"] = (world_from_old[:3, :3] @ light.direction_world / scale).astype(np.float32)
+    for name in names & {"direction_world", "normal_world"}:
+        new[name] = (world_from_old[:3, :3] @ getattr(light, name) / scale).astype(np.float32)
+    for name in names & {"half_u_world", "half_v_world"}:
+        new[name] = (world_from_old[:3, :3] @ getattr(light, name)).astype(np.float32)
+    if "radius" in names:
+        new["radius"] = light.radius * scale
+    if getattr(light, "world_from_local", None) is not None:
+        new["world_from_local"] = world_from_old[:3, :3] @ light.world_from_local / scale
     if "intensity" in names:
         new["intensity"] = light.intensity * np.float32(intensity)
     return replace(light, **new)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .case import HOLDS, WEAK, WORSE, Result
+from .case import ABOVE, HOLDS, WEAK, WORSE, Result
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,31 +40,37 @@ class StabilityReport:
             "samples": [{"parameter": sample.parameter, "value": _plain(sample.value)} for sample in result.samples]}
         if result.variant is not None:
             return {**entry, "settings": result.variant.settings}
-        return {**entry, "bound": result.limit.bound, "why": result.limit.why, "verdict": result.verdict,
+        return {**entry, "bound": _plain(result.limit.bound), "why": result.limit.why, "verdict": result.verdict,
                 "picture": (self.pictures or {}).get((result.case.name, result.technique))}
 
     def to_text(self) -> str:
         """One line a result, for a shell."""
-        lines = [f"{result.case.name:18} {result.technique:7} {_number(result.figure):>8}  bound {_number(result.limit.bound):>8}  "
+        lines = [f"{result.case.name:18} {result.technique:7} {_number(result.figure):>8}  {_held_to(result):14}  "
                  f"{result.verdict}, worst at {result.worst.parameter}" for result in self.results]
         lines += [f"{result.case.name:18} {result.technique:7} {_number(result.figure):>8}  {_kind(result)} {result.variant.name}"
                   for result in self.variants]
         verdicts = [result.verdict for result in self.results]
-        counts = ", ".join(f"{verdicts.count(verdict)} {verdict}" for verdict in (HOLDS, WEAK, WORSE))
+        own = any(result.case.remedies is not None for result in self.results)
+        counts = ", ".join(f"{verdicts.count(verdict)} {verdict}" for verdict in ((HOLDS, ABOVE) if own else (HOLDS, WEAK, WORSE)))
+        lines += [f"  {result.case.name} of {result.technique}: {result.limit.why}" for result in self.results
+                  if result.verdict == ABOVE]
         return "\n".join([*lines, counts + (f"; the report is in {self.out}" if self.out else "")])
 
     def to_markdown(self) -> str:
         """The whole report."""
-        lines = ["# Stability", "", "Every figure is 0 where nothing fails. *holds*: within the case's goal; *known weakness*: "
-                 f"above it, within the technique's own bound; *worse*: above that. Seed {self.seed}."
-                 + (" **Cancelled before its end.**" if self.cancelled else ""), ""]
+        own = any(result.case.remedies is not None for result in self.results)
+        above = ("what makes it smaller stands below each table" if own
+                 else "*known weakness*: above it, within the technique's own bound; *worse*: above that")
+        lines = ["# Stability", "", f"Every figure is 0 where nothing fails. *holds*: within the case's goal; {above}. Seed "
+                 f"{self.seed}." + (" **Cancelled before its end.**" if self.cancelled else ""), ""]
         names = list(dict.fromkeys(result.technique for result in self.results))
         lines += ["| case | goal | " + " | ".join(names) + " |", "|---|---:|" + "---:|" * len(names)]
         for case in dict.fromkeys(result.case for result in self.results):
             found = {result.technique: result for result in self.results if result.case is case}
             cells = [f"{_number(found[name].figure)}{_MARKS[found[name].verdict]}" if name in found else "" for name in names]
             lines.append(f"| [{case.name}](#{case.name}) | {_number(case.goal)} | " + " | ".join(cells) + " |")
-        lines += ["", "Unmarked: holds. `*`: known weakness. `!`: worse than its bound."]
+        lines += ["", "Unmarked: holds. `*`: above its goal." if own
+                  else "Unmarked: holds. `*`: known weakness. `!`: worse than its bound."]
         for case in dict.fromkeys(result.case for result in self.results):
             lines += self._section(case)
         return "\n".join(lines) + "\n"
@@ -76,9 +82,11 @@ class StabilityReport:
                  "| technique | figure | bound | verdict | worst at | sweep |", "|---|---:|---:|---|---|---|"]
         for result in results:
             sweep = ", ".join(f"{sample.parameter}: {_number(sample.value)}" for sample in result.samples)
-            lines.append(f"| {result.technique} | {_number(result.figure)} | {_number(result.limit.bound)} | {result.verdict} | "
+            bound = _number(result.limit.bound) if case.remedies is None else ""
+            lines.append(f"| {result.technique} | {_number(result.figure)} | {bound} | {result.verdict} | "
                          f"{result.worst.parameter} | {sweep} |")
-        lines += ["", *(f"- {result.technique}: {result.limit.why}." for result in results if result.limit.why)]
+        lines += ["", *(f"- {result.technique}: {result.limit.why}." for result in results
+                        if result.limit.why and (case.remedies is None or result.verdict == ABOVE))]
         variants = [result for result in self.variants if result.case is case]
         if variants:
             lines += ["", "| technique | | figure | as it is by default |", "|---|---|---:|---:|"]
@@ -92,7 +100,12 @@ class StabilityReport:
         return [*lines, "", *(f"    {result.command}" for result in results)]
 
 
-_MARKS = {HOLDS: "", WEAK: " *", WORSE: " !"}
+_MARKS = {HOLDS: "", WEAK: " *", WORSE: " !", ABOVE: " *"}
+
+
+def _held_to(result: Result) -> str:
+    kind, value = ("bound", result.limit.bound) if result.case.remedies is None else ("goal", result.case.goal)
+    return f"{kind} {_number(value):>8}"
 
 
 def _kind(result: Result) -> str:
