@@ -82,15 +82,15 @@ if (gltf) {
 probes.apply(scene);
 
 // The model's own camera, else one that sees all.
-const camera = new THREE.PerspectiveCamera(45, 1, 0.01, 1000);
+const camera = new THREE.PerspectiveCamera(45, 1);
 const sphere = bounds.getBoundingSphere(new THREE.Sphere());
-const given = gltf?.cameras.find((other) => other.isPerspectiveCamera);
 const target = sphere.center.clone();
-if (given) {
+const given = gltf?.cameras.find((other) => other.isPerspectiveCamera) ?? camera.clone();
+if (given.parent) {
   given.matrixWorld.decompose(camera.position, camera.quaternion, new THREE.Vector3());
-  camera.fov = given.fov;
   const forward = new THREE.Vector3(0, 0, -1).applyQuaternion(camera.quaternion);
-  target.copy(camera.position).addScaledVector(forward, Math.max(target.sub(camera.position).dot(forward), 0.1 * sphere.radius));
+  const depth = sphere.center.clone().sub(camera.position).dot(forward);
+  target.copy(camera.position).addScaledVector(forward, Math.max(depth, 0.1 * sphere.radius));
 } else {
   camera.position.copy(target).add(new THREE.Vector3(1, 0.6, 1.6).setLength(2.6 * sphere.radius));
 }
@@ -132,6 +132,9 @@ function resize() {
   renderer.setPixelRatio(window.devicePixelRatio);
   renderer.setSize(window.innerWidth, window.innerHeight);
   camera.aspect = window.innerWidth / window.innerHeight;
+  // What the given camera sees stays in a window of another shape.
+  const height = Math.tan(THREE.MathUtils.degToRad(given.fov / 2)) * Math.max(1, given.aspect / camera.aspect);
+  camera.fov = 2 * THREE.MathUtils.radToDeg(Math.atan(height));
   camera.updateProjectionMatrix();
 }
 window.addEventListener('resize', resize);

@@ -7,8 +7,8 @@
 // Units are those of the bake: radiance [W/(sr m2)], irradiance [W/m2], scene-linear Rec. 709, Y up, metres.
 
 import {
-  Color, DataTexture, DataUtils, FileLoader, HalfFloatType, LightProbe, Loader, LoaderUtils, Matrix3, Matrix4, NearestFilter, Object3D,
-  RGBAFormat, RGBAIntegerFormat, REVISION, UnsignedShortType, Vector3,
+  Color, DataTexture, DataUtils, FileLoader, HalfFloatType, LightProbe, Loader, LoaderUtils, Matrix3, Matrix4, NearestFilter,
+  Object3D, RGBAFormat, RGBAIntegerFormat, REVISION, UnsignedShortType, Vector3,
 } from 'three';
 import { COEFFICIENTS, ProbeLookup, harmonics } from './lookup.js';
 import { spliceProbes } from './shader.js';
@@ -55,8 +55,8 @@ export class RTGIProbeLoader extends Loader {
   parse(description, buffer) {
     check(description);
     if (buffer.byteLength !== description.data.bytes) {
-      throw new Error(`RTGI: ${description.data.file} holds ${buffer.byteLength} bytes, its .json says ${description.data.bytes}: ` +
-        'copy both files of one export');
+      throw new Error(`RTGI: ${description.data.file} holds ${buffer.byteLength} bytes, its .json says ${description.data.bytes}` +
+        ': copy both files of one export');
     }
     return new RTGIProbeVolumes(description, buffer);
   }
@@ -89,7 +89,7 @@ export class RTGIProbeVolumes extends Object3D {
     this.volumes = prepare(description.volumes);
     if (this.volumes.length > MOST_VOLUMES) {
       throw new Error(`RTGI: ${this.volumes.length} volumes are more than the ${MOST_VOLUMES} that a shader has room for: ` +
-        'export fewer at once');
+        'bake fewer');
     }
     const { probes, distances } = unpack(this.volumes, buffer);
     this.lookup = new ProbeLookup(this.volumes, probes.numbers, distances);
@@ -233,8 +233,8 @@ export class RTGIProbeVolumes extends Object3D {
     const most = renderer.capabilities.maxTextureSize;
     for (const { image } of [this.uniforms.rtgiProbes.value, this.uniforms.rtgiDistances.value]) {
       if (Math.max(image.width, image.height) > most) {
-        throw new Error(`RTGI: the probes fill a texture of ${image.width} x ${image.height}, and this device takes ${most} at most: ` +
-          'bake fewer probes or export the volumes apart');
+        throw new Error(`RTGI: the probes fill a texture of ${image.width} x ${image.height}, this device takes ${most} at most: ` +
+          'bake fewer probes');
       }
     }
   }
@@ -254,8 +254,8 @@ export class RTGILightProbe extends LightProbe {
   }
 }
 
-const isLit = (material) => Boolean(material.isMeshStandardMaterial || material.isMeshLambertMaterial || material.isMeshPhongMaterial ||
-  material.isMeshToonMaterial) && !material.isNodeMaterial;
+const LIT = ['isMeshStandardMaterial', 'isMeshLambertMaterial', 'isMeshPhongMaterial', 'isMeshToonMaterial'];
+const isLit = (material) => LIT.some((name) => material[name]) && !material.isNodeMaterial;
 
 // The volumes of a .json with what the look-up needs of each.
 function prepare(volumes) {
@@ -307,8 +307,8 @@ function wrapped(row, column, tile) {
 function makeUniforms(volumes, halves, distances) {
   const flat = (values, type = Float32Array) => ({ value: type.from(volumes.flatMap(values)) });
   return {
-    rtgiProbes: { value: listTexture(halves, COEFFICIENTS, RGBAFormat, HalfFloatType) },
-    rtgiDistances: { value: listTexture(distances, 1, RGBAIntegerFormat, UnsignedShortType) },
+    rtgiProbes: { value: listTexture(halves, COEFFICIENTS, RGBAFormat, HalfFloatType, 'RGBA16F') },
+    rtgiDistances: { value: listTexture(distances, 1, RGBAIntegerFormat, UnsignedShortType, 'RGBA16UI') },
     rtgiFromWorld: { value: new Matrix4() },
     rtgiIntensity: { value: 1 },
     rtgiLatticeFromOffset: flat((volume) => volume.latticeFromOffset),
@@ -321,13 +321,15 @@ function makeUniforms(volumes, halves, distances) {
 }
 
 // `values` (RGBA texels) folded into a texture near a square, an item's `texels` side by side.
-function listTexture(values, texels, format, type) {
+function listTexture(values, texels, format, type, internalFormat) {
   const items = values.length / (4 * texels);
   const perRow = Math.max(Math.min(Math.ceil(Math.sqrt(items / texels)), items), 1);
   const width = perRow * texels, height = Math.ceil(items / perRow);
   const padded = new Uint16Array(4 * width * height);
   padded.set(values);
   const texture = new DataTexture(padded, width, height, format, type);
+  // Not every release finds the one of integers by itself.
+  texture.internalFormat = internalFormat;
   texture.magFilter = texture.minFilter = NearestFilter;
   texture.needsUpdate = true;
   return texture;

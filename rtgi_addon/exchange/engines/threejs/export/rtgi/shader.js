@@ -17,7 +17,8 @@ vRTGIPosition = (rtgiFromWorld * (modelMatrix * rtgiPosition)).xyz;
 `;
 
 const fragmentPars = /* glsl */ `
-// A probe is nine texels: its radiance coefficients, and beside the first four (offset from the lattice point, 1 if it holds light).
+// A probe is nine texels: its radiance coefficients; in the fourth channel of the first four its offset from the lattice point and
+// whether it holds light.
 uniform highp sampler2D rtgiProbes;
 // Bordered octahedral tiles of (mean, deviation) of the distance, of a texel and of the next one in its row.
 uniform highp usampler2D rtgiDistances;
