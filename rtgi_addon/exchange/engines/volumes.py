@@ -66,8 +66,8 @@ class ExportVolume:
 
 
 def engine_field(bundle: Bundle) -> ProbeField:
-    """The bundle's light as engines hold it, bands above the second left out and missing ones zero: what exports equal."""
-    return ProbeField(tuple(_of_order(grid) for grid in bundle.grids), includes_direct=bundle.field.includes_direct)
+    """The bundle's light as engines hold it: bands above the second left out, missing ones zero, probes' places in half floats."""
+    return ProbeField(tuple(_as_held(grid) for grid in bundle.grids), includes_direct=bundle.field.includes_direct)
 
 
 def notes_on_order(bundle: Bundle) -> list[str]:
@@ -102,9 +102,10 @@ def _export_volume(lookup: GridLookup, folder: str, axes: Axes) -> ExportVolume:
         live=lookup.live.reshape(nz, ny, nx), moments=moments)
 
 
-def _of_order(grid: ProbeGrid) -> ProbeGrid:
+def _as_held(grid: ProbeGrid) -> ProbeGrid:
     count = sh.coefficient_count(ORDER)
     coefficients = np.zeros((*grid.sh.shape[:3], count, 3), np.float32)
     kept = min(count, grid.sh.shape[3])
     coefficients[..., :kept, :] = grid.sh[..., :kept, :]
-    return replace(grid, sh=coefficients)
+    # A probe's place decides how surely it sees a point, so what is rounded here must not be rounded again by a texture.
+    return replace(grid, sh=coefficients, offset_world=grid.offset_world.astype(np.float16).astype(np.float32))

@@ -50,8 +50,9 @@ function prepareLamp(light, radius) {
   light.visible = !probes.includesDirect;
   light.castShadow = Boolean(light.shadow);
   if (light.isDirectionalLight) {
-    const direction = light.getWorldPosition(new THREE.Vector3()).sub(light.target.getWorldPosition(new THREE.Vector3())).normalize();
     const centre = bounds.getCenter(new THREE.Vector3());
+    const towards = light.target.getWorldPosition(new THREE.Vector3());
+    const direction = light.getWorldPosition(new THREE.Vector3()).sub(towards).normalize();
     light.shadow.camera = new THREE.OrthographicCamera(-radius, radius, radius, -radius, 0, 4 * radius);
     light.target.position.copy(light.target.parent.worldToLocal(centre.clone()));
     light.position.copy(light.parent.worldToLocal(centre.addScaledVector(direction, 2 * radius)));
@@ -125,7 +126,8 @@ form.oninput = () => {
   balls.visible = showBalls.checked;
 };
 form.oninput();
-document.getElementById('info').textContent = probes.volumes.map(({ name, resolution }) => `${name}: ${resolution.join(' x ')}`).join('; ');
+document.getElementById('info').textContent = probes.volumes
+  .map(({ name, resolution }) => `${name}: ${resolution.join(' x ')} probes`).join('; ');
 form.hidden = false;
 
 function resize() {

@@ -85,7 +85,8 @@ for (const type of ['MeshPhysicalMaterial', 'MeshLambertMaterial', 'MeshPhongMat
 check('visibility, instanced', hard, probes.kit, new THREE.MeshLambertMaterial(), { instanced: true });
 check('light probe', lightProbe, null, new THREE.MeshLambertMaterial(), { light: new RTGILightProbe(probes.kit) });
 // Light probes are for objects without the hook: with it they must not add to the light.
-check('visibility, beside a light probe', hard, probes.kit, new THREE.MeshStandardMaterial(), { light: new RTGILightProbe(probes.kit) });
+check('visibility, beside a light probe', hard, probes.kit, new THREE.MeshStandardMaterial(),
+  { light: new RTGILightProbe(probes.kit) });
 
 probes.kit.position.set(-3, 5, 2);
 probes.kit.rotation.set(0.4, -1.1, 2.0);
