@@ -150,7 +150,7 @@ def draw_header(self, context):
     if scene.rtgi_preview.compare:
         row.prop(scene.rtgi_preview, "compare_technique", text="")
     shown = shown_for(scene)
-    if shown.field is None or is_stale(scene, shown):
+    if (shown.field is None and shown.live is None) or is_stale(scene, shown):
         row.operator("rtgi.bake", text="", icon="ERROR")
 
 

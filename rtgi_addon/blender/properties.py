@@ -119,9 +119,10 @@ def read_value(technique: Technique, group, name: str):
     return kind(value)
 
 
-def scene_settings(scene: bpy.types.Scene):
-    """(technique, its Settings) as the panel says. Raises UsageError for a value out of range."""
-    technique = registry()[scene.rtgi.technique]
+def scene_settings(scene: bpy.types.Scene, technique_name: str | None = None):
+    """(technique, its Settings) as the panel says, of the technique that is chosen or of the one of that name. Raises UsageError
+    for a value out of range."""
+    technique = registry()[technique_name or scene.rtgi.technique]
     group = getattr(scene.rtgi, attribute(technique.name))
     values = {item.name: read_value(technique, group, item.name) for item in fields(technique.Settings)}
     if has_goal(technique) and scene.rtgi.mode == "ERROR":
@@ -138,6 +139,20 @@ def overrides(group, technique_name: str | None = None) -> dict:
     values = getattr(group, attribute(technique.name))
     return {item.name: read_value(technique, values, item.name) for item in fields(technique.Settings)
             if getattr(values, f"override_{item.name}")}
+
+
+def use_preset(group, name: str) -> None:
+    """Set every technique of ``Scene.rtgi`` to its preset ``name``; what a preset does not name stays as it is."""
+    for technique in registry().values():
+        values = getattr(group, attribute(technique.name))
+        for setting_name, value in technique.presets.get(name, {}).items():
+            if setting_name in GOALS:
+                if has_goal(technique):
+                    group.mode = setting_name.upper()
+            elif value_type(technique, setting_name)[1]:
+                setattr(values, f"use_{setting_name}", value is not None)
+            if value is not None:
+                setattr(values, setting_name, value)
 
 
 class RTGI_PG_last_bake(bpy.types.PropertyGroup):
@@ -181,7 +196,7 @@ def _scene_group(techniques: dict[str, Technique], groups: dict[str, type]) -> t
     }
     for name, group in groups.items():
         annotations[attribute(name)] = bpy.props.PointerProperty(type=group, name=techniques[name].label)
-    return type("RTGI_PG_scene", (bpy.types.PropertyGroup,), {"__annotations__": annotations})
+    return type("RTGI_PG_scene", (bpy.types.PropertyGroup,), {"__annotations__": annotations, "use_preset": use_preset})
 
 
 def _volume_group(techniques: dict[str, Technique], groups: dict[str, type]) -> type:

@@ -10,6 +10,7 @@ from weakref import WeakKeyDictionary
 import gpu
 import numpy as np
 
+from ..scene import Scene
 from ..transport.reflective_shadow_map import ReflectiveShadowMap
 from ..transport.shadow_views import ShadowView, texel_power
 from .device import RenderTarget
@@ -32,24 +33,36 @@ class CapturedTextures:
     power: gpu.types.GPUTexture
 
 
-def draw_capture(context, view: ShadowView) -> CapturedTextures:
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """A scene as it is on the GPU: its ``surfaces`` (None if it has none), of a pass that reads at least what "rsm_capture" does,
+    within ``bounds`` (2, 3) float64."""
+
+    scene: Scene
+    surfaces: SurfacePass | None
+    bounds: np.ndarray
+
+
+def draw_capture(drawn: Drawn, view: ShadowView) -> CapturedTextures:
     """Fill ``view`` by drawing the scene; the textures stay on the GPU."""
-    if context.geometry not in _passes:
-        _passes[context.geometry] = SurfacePass(context.scene, "rsm_capture")
     size = view.resolution
     power = np.empty((size, size, 4), np.float32)
-    power[..., :3], power[..., 3] = texel_power(context.scene.lights[view.lamp], view), view.texel_measure()
+    power[..., :3], power[..., 3] = texel_power(drawn.scene.lights[view.lamp], view), view.texel_measure()
     power = upload(power)
     target = RenderTarget(size, size, ("RGBA32F",) * 3, depth=True)
     with target.drawing():
-        _passes[context.geometry].draw(View(view.clip_from_world, view.world_from_view, view.far, view.orthographic),
-                                       {"power": power})
+        if drawn.surfaces is not None:
+            drawn.surfaces.draw(View(view.clip_from_world, view.world_from_view, view.far, view.orthographic), {"power": power},
+                                name="rsm_capture")
     return CapturedTextures(view, *target.colors, power)
 
 
 def capture(context, view: ShadowView) -> ReflectiveShadowMap:
     """Fill ``view`` by drawing the scene."""
-    drawn = draw_capture(context, view)
+    if context.geometry not in _passes:
+        _passes[context.geometry] = SurfacePass(context.scene, "rsm_capture")
+    bounds = np.array(context.geometry.bounds(), np.float64)
+    drawn = draw_capture(Drawn(context.scene, _passes[context.geometry], bounds), view)
     position, normal, flux = (download(texture) for texture in (drawn.position, drawn.normal, drawn.flux))
     primitive = decode_primitive(position, normal)
     return ReflectiveShadowMap(view, *(np.ascontiguousarray(part[..., :3]) for part in (position, normal, flux)), primitive)

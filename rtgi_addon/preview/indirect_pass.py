@@ -12,6 +12,7 @@ import numpy as np
 
 from ..numerics import sh
 from ..scene import Scene, World
+from .capture import Drawn
 from .device import dispatch
 from .program import Program
 from .programs import indirect_program
@@ -21,10 +22,12 @@ from .uniforms import UniformStruct
 class Indirect(Protocol):
     """One technique's indirect light on the GPU: ``program`` made by ``indirect_program``, and the ``uniforms`` and ``samplers`` of
     the names that were given to it. ``includes_direct`` says that the light of lamps is in it already; ``error`` why it does not
-    follow the scene, or None."""
+    follow the scene, or None. ``captures`` says that it is made of what is drawn: then it is followed with ``capture``, also when
+    objects move, else with ``follow``."""
 
     program: Program
     includes_direct: bool
+    captures: bool
     error: str | None
 
     @property
@@ -38,6 +41,9 @@ class Indirect(Protocol):
     def follow(self, scene: Scene) -> bool:
         """Take in that ``scene`` has changed (lamps moved, the world turned) as far as the technique can without a new bake; what
         of it runs on the GPU runs here. False if its light does not fit the scene any more."""
+
+    def capture(self, drawn: Drawn) -> bool:
+        """Take in lamps, objects and world of what is drawn. False if its light does not fit the scene any more."""
 
     @property
     def busy(self) -> bool:
@@ -61,7 +67,7 @@ def draw_indirect(indirect: Indirect, gbuffer: Mapping[str, gpu.types.GPUTexture
 class WorldLight:
     """The light of the world alone, as if nothing stood in its way: what is shown where there is no bake."""
 
-    includes_direct, error = False, None
+    includes_direct, captures, error = False, False, None
     program = indirect_program("indirect_world", (("world_light", UniformStruct("WorldLight", (("vec4", "cosine_sh", 9),))),))
 
     def __init__(self, scene: Scene):

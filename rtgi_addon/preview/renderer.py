@@ -9,6 +9,7 @@ from ..numerics.sampling import sobol_owen
 from ..scene import Instance, Material, Mesh, Scene
 from ..techniques.base import Field, validate_settings
 from .camera_view import CameraView
+from .capture import Drawn
 from .direct_light import DirectLight
 from .film import Background, Film
 from .gbuffer import GBuffer, gbuffer_surfaces
@@ -24,13 +25,15 @@ _FILTER_SEED = 0
 
 
 class PreviewRenderer:
-    """Renders ``scene`` with the indirect light of ``field`` (None: the world's own, unshadowed). All of it is GPU work: main
-    thread only. ``passes`` of PASSES are what frames are kept of. ``baked`` is the scene that ``field`` was baked from (None:
-    ``scene``, which must begin with the lamps and the world of the bake): its geometry goes on reflecting when lamps move.
+    """Renders ``scene`` with the indirect light of ``field``; None: what ``live``, the settings of a technique that needs no bake,
+    makes of what is drawn, else the world's own, unshadowed. All of it is GPU work: main thread only. ``passes`` of PASSES are
+    what frames are kept of. ``baked`` is the scene that ``field`` was baked from (None: ``scene``): its geometry goes on
+    reflecting when lamps move, in techniques that cannot do without a bake. Their ``scene`` must begin with the lamps and the
+    world of the bake.
     """
 
     def __init__(self, scene: Scene, field: Field | None = None, settings: PreviewSettings | None = None,
-                 passes: tuple[str, ...] = PASSES, baked: Scene | None = None):
+                 passes: tuple[str, ...] = PASSES, baked: Scene | None = None, live=None):
         self.settings = settings or PreviewSettings()
         validate_settings(self.settings)
         self.scene, self.field, self._passes = scene, field, tuple(passes)
@@ -40,7 +43,9 @@ class PreviewRenderer:
         self._background = Background(scene.world)
         self._lamps = DirectLight(self.settings)
         self._baked = baked or scene
-        self._indirect: Indirect = make_indirect(field, self._baked, samples=FRAME_SAMPLES)
+        self._indirect: Indirect = make_indirect(field, self._baked, samples=FRAME_SAMPLES, live=live)
+        if self._indirect.captures and (field is None or self._baked is not scene):
+            self._capture()
         self._gbuffer: GBuffer | None = None
         self._film: Film | None = None
         self._view: CameraView | None = None
@@ -95,17 +100,25 @@ class PreviewRenderer:
             return
         if scene.world is not before.world:
             self._background = Background(scene.world)
-        if not (_same(before.meshes, scene.meshes) and _same(before.materials, scene.materials)
-                and self._surfaces is not None and self._surfaces.can_move(scene)):
+        lit = scene.world is not before.world or not _same(before.lights, scene.lights)
+        edited = not (_same(before.meshes, scene.meshes) and _same(before.materials, scene.materials))
+        moved = edited or not _same(before.instances, scene.instances)
+        if edited or (moved and (self._surfaces is None or not self._surfaces.can_move(scene))):
             self._images.keep(scene)
             self._surfaces = _surfaces(scene, self._images, self._surfaces)
-            self._bounds = scene_bounds(scene)
-        elif not _same(before.instances, scene.instances):
+        elif moved:
             self._surfaces.move(scene)
+        if moved:
             self._bounds = scene_bounds(scene)
-        if scene.world is not before.world or not _same(before.lights, scene.lights):
+        if self._indirect.captures:
+            if lit or moved:
+                self._capture()
+        elif lit:
             self._indirect.follow(replace(self._baked, lights=scene.lights, world=scene.world))
         self.reset()
+
+    def _capture(self) -> None:
+        self._indirect.capture(Drawn(self.scene, self._surfaces, self._bounds))
 
     def frame(self, view: CameraView, size: tuple[int, int]) -> None:
         """Average one more sample of ``view`` in, at ``size`` (width, height) pixels before the resolution scale; another view or

@@ -29,20 +29,26 @@ class LightContext:
 
     def relit(self, scene: Scene) -> "LightContext":
         """The same triangles, BVH and materials under the lamps and world of ``scene``. Raises BakeError if those differ."""
-        for part in ("meshes", "instances", "materials"):
-            if not _same(getattr(scene, part), getattr(self.scene, part)):
-                what = "materials have" if part == "materials" else "geometry has"
-                raise BakeError(f"the scene's {what} changed since the bake",
-                                "bake again; relighting follows lamps and world only")
+        changed = changed_surfaces(self.scene, scene)
+        if changed:
+            raise BakeError(f"the scene's {changed} changed since the bake", "bake again; relighting follows lamps and world only")
         other = object.__new__(LightContext)
         other.__dict__.update(self.__dict__)
         other.scene, other.lamps = scene, LampTable(scene.lights)
-        if not _same(scene.world, self.scene.world):
+        if not same_values(scene.world, self.scene.world):
             other.environment = Environment(scene.world)
         return other
 
 
-def _same(a, b) -> bool:
+def changed_surfaces(before: Scene, after: Scene) -> str:
+    """What of the surfaces that light meets differs, as the beginning of a sentence ("geometry has"), or nothing."""
+    for part in ("meshes", "instances", "materials"):
+        if not same_values(getattr(after, part), getattr(before, part)):
+            return "materials have" if part == "materials" else "geometry has"
+    return ""
+
+
+def same_values(a, b) -> bool:
     """Whether two parts of scenes hold the same values."""
     if a is b:
         return True
@@ -51,9 +57,9 @@ def _same(a, b) -> bool:
     if isinstance(a, np.ndarray):
         return np.array_equal(a, b)
     if is_dataclass(a):
-        return all(_same(getattr(a, item.name), getattr(b, item.name)) for item in fields(a))
+        return all(same_values(getattr(a, item.name), getattr(b, item.name)) for item in fields(a))
     if isinstance(a, dict):
-        return a.keys() == b.keys() and all(_same(value, b[key]) for key, value in a.items())
+        return a.keys() == b.keys() and all(same_values(value, b[key]) for key, value in a.items())
     if isinstance(a, tuple):
-        return len(a) == len(b) and all(_same(x, y) for x, y in zip(a, b, strict=True))
+        return len(a) == len(b) and all(same_values(x, y) for x, y in zip(a, b, strict=True))
     return a == b

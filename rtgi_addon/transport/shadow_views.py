@@ -104,16 +104,21 @@ def views_of(context, lamp: int, resolution: int = 512, *, focus: np.ndarray | N
     cube, or a frustum around the scene if it is far outside; a spot a frustum around its cone, or cube faces if that is wide; an
     area lamp ``area_points`` stratified points with a hemicube each, or a frustum if its beam is narrow.
     """
-    light = context.scene.lights[lamp]
-    views = views_of_light(light, np.array(context.geometry.bounds(), np.float64), resolution, lamp, focus=focus,
-                           area_points=area_points)
+    return lit_views(context.scene.lights[lamp], np.array(context.geometry.bounds(), np.float64), resolution, lamp, focus=focus,
+                     area_points=area_points)
+
+
+def lit_views(light: Light, bounds: np.ndarray, resolution: int, lamp: int = 0, *, focus: np.ndarray | None = None,
+              area_points: int = 4) -> tuple[ShadowView, ...]:
+    """As ``views_of`` for a scene of which only ``bounds`` (2, 3) are known."""
+    views = views_of_light(light, bounds, resolution, lamp, focus=focus, area_points=area_points)
     # A wide spot reaches some faces of its cube only.
     return tuple(view for view in views if texel_power(light, view).any()) if isinstance(light, SpotLight) else views
 
 
 def views_of_light(light: Light, bounds: np.ndarray, resolution: int, lamp: int = 0, *, focus: np.ndarray | None = None,
                    area_points: int = 4) -> tuple[ShadowView, ...]:
-    """As ``views_of`` for a scene of which only ``bounds`` (2, 3) are known; a wide spot gets all the faces of its cube."""
+    """As ``lit_views``, but a wide spot gets all the faces of its cube."""
     if not np.any(_strength(light) > 0):
         return ()
     if isinstance(light, SunLight):

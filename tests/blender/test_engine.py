@@ -120,11 +120,31 @@ def test_a_bake_of_another_technique_is_not_shown(scene):
     from rtgi_addon.blender.engine.shown import shown_for
     from rtgi_addon.blender.session import session
     bpy.ops.rtgi.bake()
-    scene.rtgi.technique = "lpv"
+    scene.rtgi.technique = "vpl"
     assert shown_for(scene).field is None and "of the technique probes" in shown_for(scene).note
     session.baked.clear()
     scene.rtgi.technique = "probes"
     assert shown_for(scene).field is not None
+
+
+@pytest.mark.parametrize("technique", ["rsm", "lpv"])
+def test_techniques_without_a_bake_are_live(scene, technique):
+    from rtgi_addon.blender.engine.shown import LIVE, shown_for
+    from rtgi_addon.blender.engine.viewport import is_stale
+    from rtgi_addon.blender.session import session
+    scene.rtgi.technique = technique
+    before = shown_for(scene)
+    assert before.field is None and before.note == LIVE and before.live.order == getattr(scene.rtgi, f"technique_{technique}").order
+    scene.rtgi.technique_rsm.resolution, scene.rtgi.technique_lpv.resolution = 32, 8
+    bpy.ops.rtgi.bake()
+    shown = shown_for(scene)
+    assert shown.field is not None and not shown.note and shown.live.resolution == {"rsm": 32, "lpv": 8}[technique]
+    session.stale[scene.name] = True
+    assert not is_stale(scene, shown)
+    scene.rtgi.technique_rsm.visibility = True
+    if technique == "rsm":
+        session.baked.clear()
+        assert shown_for(scene).live is None
 
 
 def test_a_bundle_that_is_lost_or_damaged_is_survived(scene, tmp_path):
@@ -173,7 +193,7 @@ def test_the_panels_and_the_header_can_be_drawn(scene):
     assert {"technique", "samples", "render_samples", "mode", "shadow_cascades", "film_transparent", "use_irradiance",
             "probes", "bounds", "leaks", "overlays_in_renders", "compare"} <= set(shown)
     assert "split" not in shown
-    scene.rtgi_preview.compare, layout = True, Layout()
+    scene.rtgi_preview.compare, scene.rtgi_preview.compare_technique, layout = True, "vpl", Layout()
     preview_panels.RTGI_PT_preview_compare.draw(SimpleNamespace(layout=layout), context)
     assert {"compare_technique", "split"} <= set(layout.shown) and "Nothing baked" in " ".join(layout.texts)
     scene.rtgi_preview.compare = False

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import room_scenes as rooms
 import scene_builders as build
-from receivers import directions, points_in, relative_error, waited
+from receivers import directions, drawn, points_in, relative_error, waited
 
 from rtgi_addon.progress import Progress
 from rtgi_addon.scene import World
@@ -71,7 +71,7 @@ def test_a_moved_lamp_is_followed_on_the_gpu(indirect, settings, world):
     made = indirect.make_indirect(field, scene)
     points, normals = points_in((1.9, 0.9, 0.9), 1500), directions(1500)
     for offset in (0.3, -0.2):
-        assert made.follow(moved(scene, offset)) and not made.busy
+        assert made.capture(drawn(moved(scene, offset))) and not made.busy
         found = relative_error(made, field.relight(moved(scene, offset)), points, normals)
         assert found.max() < 0.005 and np.sqrt(np.mean(found**2)) < 5e-4
     assert relative_error(made, field, points, normals).max() > 0.02
@@ -83,7 +83,7 @@ def test_emissive_surfaces_stay_and_lamps_go_out(indirect):
     field = bake(scene)
     made = indirect.make_indirect(field, scene)
     dark = replace(scene, lights=())
-    assert made.follow(dark)
+    assert made.capture(drawn(dark))
     assert relative_error(made, field.relight(dark), points_in(0.9, 500), directions(500)).max() < 1e-4
 
 
@@ -92,19 +92,48 @@ def test_a_changed_world_is_traced_beside_the_picture(indirect):
     made = indirect.make_indirect(field, ROOMS)
     points, normals = points_in((1.9, 0.9, 0.9), 500), directions(500)
     other = moved(ROOMS, 0.2, 1.0)
-    assert made.follow(other) and waited(made)
+    assert made.capture(drawn(other)) and waited(made)
     assert relative_error(made, field.relight(other), points, normals).max() < TOLERANCE
     # The next lamp is followed on the GPU again.
     again = moved(other, -0.3)
-    assert made.follow(again) and not made.busy
+    assert made.capture(drawn(again)) and not made.busy
     assert relative_error(made, field.relight(again), points, normals).max() < 0.005
+    made.close()
+
+
+def test_a_moved_wall_is_met_at_once_and_blocks_soon(indirect):
+    field, thick = bake(ROOMS), rooms.two_rooms(resolution=(2, 2, 2), half_size=(2.0, 0.95, 0.95), thickness=0.6)
+    made = indirect.make_indirect(field, ROOMS)
+    points, normals = points_in((1.9, 0.9, 0.9), 500), directions(500)
+    assert made.captures and made.capture(drawn(thick)) and made.busy
+    # What the lamp lights has moved already; blocking has not.
+    assert relative_error(made, field, points, normals).max() > 0.01
+    assert waited(made) and made.error is None
+    assert relative_error(made, bake(thick), points, normals).max() < TOLERANCE
+    # The next lamp is followed in the new rooms.
+    lamp = moved(thick, 0.2)
+    assert made.capture(drawn(lamp)) and not made.busy
+    assert relative_error(made, bake(lamp), points, normals).max() < 0.005
+    made.close()
+
+
+def test_volumes_need_no_bake(indirect):
+    settings = LpvSettings(order=1, steps=32, map_resolution=64)
+    made = indirect.make_indirect(None, ROOMS, live=settings)
+    points, normals = points_in((1.9, 0.9, 0.9), 500), directions(500)
+    assert indirect.needs_no_bake(settings) and made.captures and made.capture(drawn(ROOMS))
+    # The lamp moves while the worker makes the first volumes: it is followed as soon as they are there.
+    after = moved(ROOMS, 0.3)
+    assert made.capture(drawn(after)) and waited(made) and made.error is None
+    assert relative_error(made, bake(after), points, normals).max() < 0.005
     made.close()
 
 
 def test_what_cannot_be_followed_is_said(indirect):
     field = bake(ROOMS)
     made = indirect.make_indirect(field, ROOMS)
-    assert not made.follow(rooms.two_rooms(thickness=0.2)) and "bake again" in made.error
-    read = LpvField.from_arrays(field.arrays(), params=field.params)
-    made = indirect.make_indirect(read, ROOMS)
-    assert not made.follow(moved(ROOMS)) and "bake again" in made.error
+    empty = replace(ROOMS, instances=())
+    assert made.capture(drawn(empty)) and not waited(made) and "no geometry" in made.error
+    made.close()
+    made = indirect.make_indirect(LpvField.from_arrays(field.arrays(), params=field.params), ROOMS)
+    assert not made.captures and not made.follow(moved(ROOMS)) and "bake again" in made.error

@@ -6,16 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scene_builders as build
-from receivers import directions, points_in, relative_error, waited
+from receivers import directions, drawn, points_in, relative_error, waited
 
 from rtgi_addon.progress import Progress
-from rtgi_addon.scene import AreaLight, SpotLight, SunLight
+from rtgi_addon.scene import AreaLight, Instance, SpotLight, SunLight
 from rtgi_addon.techniques.rsm import TECHNIQUE, RsmSettings
 
 # Float sums in another order. A sample on the border of two texels may fall either way: one of some hundred, in few receivers.
 TYPICAL, WORST = 2e-5, 0.03
 QUICK = {"resolution": 96, "order": 1}
 BOX = build.closed_box(albedo=0.6, light_position=(0.2, -0.3, 0.4))
+BALL = build.sphere("ball", radius=0.25)
 SUN = SunLight("sun", np.float32([0.6, 0.0, -0.8]), np.float32([3.0, 2.0, 1.0]), angle=0.0)
 
 
@@ -27,6 +28,12 @@ def indirect(gpu_device):
 
 def bake(scene, **settings):
     return TECHNIQUE.bake(scene, RsmSettings(**(QUICK | settings)), np.random.default_rng(0), Progress())
+
+
+def ball_in_the_box(x):
+    """BOX with a ball at ``x``."""
+    instance = Instance("ball", len(BOX.meshes), build.transform((x, 0.1, 0.3)))
+    return replace(BOX, meshes=(*BOX.meshes, BALL), instances=(*BOX.instances, instance))
 
 
 def lit_by(*lights):
@@ -86,7 +93,7 @@ def test_moved_lamps_are_captured_on_the_gpu(indirect, lights):
     after = replace(before, lights=lights)
     field = bake(before)
     made = indirect.make_indirect(field, before, samples=2000)
-    assert made.follow(after) and made.error is None
+    assert made.capture(drawn(after)) and made.error is None
     points = points_in(0.9, 2000) + np.float32([0, 0, 0.0 if before is BOX else 0.95])
     normals = directions(2000)
     # All texels, of maps traced by rays: the samples' mean, but for noise and for texels on edges.
@@ -103,13 +110,36 @@ def test_lamps_that_light_nothing_are_dark(indirect):
     points, normals = points_in(1.0, 100), directions(100)
     # A sun along the plane, and no lamp at all.
     for lights in ((), (replace(SUN, direction_world=np.float32([1.0, 0.0, 0.0])),)):
-        assert made.follow(replace(scene, lights=lights))
+        assert made.capture(drawn(replace(scene, lights=lights)))
         assert not irradiance(made, points, normals).any()
 
 
-def test_changed_geometry_is_said(indirect):
-    made = indirect.make_indirect(bake(BOX), BOX)
-    assert not made.follow(build.closed_box(half_size=2.0)) and "bake again" in made.error
+def test_moved_objects_are_captured_on_the_gpu(indirect):
+    """A ball off the floor: light falls on it elsewhere, which no relighting of the bake knows."""
+    from rtgi_addon.preview.indirect.base import irradiance
+    before, after = ball_in_the_box(-0.5), ball_in_the_box(0.5)
+    made = indirect.make_indirect(bake(before), before, samples=2000)
+    assert made.captures and made.capture(drawn(after))
+    points, normals = points_in((0.3, 0.9, 0.9), 2000), directions(2000)
+    expected = bake(after, every_texel=True).irradiance(points, normals)
+    found = irradiance(made, points, normals)
+    assert np.sqrt(np.mean((found - expected) ** 2)) < 0.05 * expected.mean()
+    stale = bake(before, every_texel=True).irradiance(points, normals)
+    assert np.sqrt(np.mean((stale - expected) ** 2)) > 0.1 * expected.mean()
+
+
+def test_maps_need_no_bake(indirect):
+    from rtgi_addon.preview.indirect.base import irradiance
+    settings = RsmSettings(**QUICK)
+    assert indirect.needs_no_bake(settings) and not indirect.needs_no_bake(replace(settings, visibility=True))
+    made = indirect.make_indirect(None, BOX, live=replace(settings, samples=2000))
+    points, normals = points_in(0.9, 2000), directions(2000)
+    assert not irradiance(made, points, normals).any()
+    assert made.capture(drawn(BOX))
+    expected = bake(BOX, every_texel=True).irradiance(points, normals)
+    found = irradiance(made, points, normals)
+    assert found.mean() == pytest.approx(expected.mean(), rel=2e-3)
+    assert np.sqrt(np.mean((found - expected) ** 2)) < 0.05 * expected.mean()
 
 
 def test_grids_with_shadow_rays_follow_on_a_worker(indirect):

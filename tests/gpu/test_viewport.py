@@ -1,5 +1,6 @@
 """What a viewport puts into its region: one technique or two with a line between, and overlays on top."""
 
+import time
 from types import SimpleNamespace
 
 import numpy as np
@@ -103,6 +104,43 @@ def test_a_viewport_follows_the_switches(scene):
     scene.rtgi_preview.probes = "none"
     again, _ = drawn(viewport)
     np.testing.assert_allclose(again, plain, atol=1e-5)
+
+
+@pytest.mark.parametrize("technique", ["rsm", "lpv"])
+def test_techniques_that_need_no_bake_follow_objects(scene, technique):
+    import bpy
+
+    from rtgi_addon.blender.engine.live import live_scene
+    from rtgi_addon.blender.engine.viewport import Viewport
+    from rtgi_addon.blender.extract.refresh import refresh_scene
+    bpy.ops.mesh.primitive_cube_add(size=1.2, location=(-1.2, 1.2, -1.4))
+    scene.rtgi.technique, scene.rtgi_preview.mode = technique, "indirect"
+    scene.rtgi_preview.samples = 4
+    scene.rtgi.technique_rsm.resolution, scene.rtgi.technique_lpv.steps = 64, 32
+    viewport, live = Viewport(), live_scene(bpy.context.evaluated_depsgraph_get())
+    live.wants_all = True
+    live.read(bpy.context.evaluated_depsgraph_get())
+
+    def settled():
+        until = time.monotonic() + 60
+        image, stats = drawn(viewport)
+        while viewport.unsettled and time.monotonic() < until:
+            image, stats = drawn(viewport)
+        return image[..., :3], stats
+
+    before, stats = settled()
+    assert "Live, without a bake" in stats and "out of date" not in stats
+    assert np.median(before) > 0
+    bpy.data.objects["Cube.001"].location.x = 1.2
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    live.scene = refresh_scene(live.scene, depsgraph)
+    after, stats = settled()
+    assert "out of date" not in stats
+    viewport.close()
+    fresh, _ = settled()
+    assert np.abs(before - fresh).mean() > 0.03 * fresh.mean()
+    np.testing.assert_allclose(after, fresh, rtol=1e-3, atol=1e-3 * fresh.max())
+    viewport.close()
 
 
 def test_leaks_are_shown_of_the_bake_that_has_them(scene):

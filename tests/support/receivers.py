@@ -19,6 +19,14 @@ def relative_error(made, field, points, normals):
     return error(made, field.irradiance(points, normals), points, normals)
 
 
+def drawn(scene):
+    """``scene`` as the preview has it on the GPU."""
+    from rtgi_addon.preview.capture import Drawn
+    from rtgi_addon.preview.gbuffer import gbuffer_surfaces
+    from rtgi_addon.preview.renderer import scene_bounds
+    return Drawn(scene, gbuffer_surfaces(scene) if scene.instances else None, scene_bounds(scene))
+
+
 def waited(made, seconds=60.0):
     """Whether ``made`` took over anything once its worker had come to rest."""
     changed, until = False, time.monotonic() + seconds

@@ -34,7 +34,8 @@ def render(engine, depsgraph) -> None:
     engine.update_stats("", "Relighting")
     field = lit_for(shown, scene, progress.span(_READING, _READING + _RELIGHTING))
     settings = preview_settings(original, final=True)
-    renderer = PreviewRenderer(scene, field, settings, tuple(entry.source for entry in passes_of(layer)))
+    renderer = PreviewRenderer(scene, field, settings, tuple(entry.source for entry in passes_of(layer)),
+                               None if shown.baked is None or field is not shown.field else shown.baked.scene, shown.live)
     drawing = progress.span(_READING + _RELIGHTING, 1.0)
     view, written = CameraView.of(camera), time.monotonic()
     for sample in range(settings.samples):

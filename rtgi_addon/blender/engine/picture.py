@@ -11,21 +11,21 @@ class Picture:
 
     def __init__(self):
         self.renderer = None
-        self._settings = self._field = self._seen = None
+        self._settings = self._field = self._live = self._seen = None
         self._size = (0, 0)
 
     def frame(self, scene: Scene, shown: Shown, settings, seen, size: tuple[int, int]) -> None:
         """Show ``scene`` in the light of ``shown`` as ``settings`` (PreviewSettings) say, and average one sample of the CameraView
         ``seen`` in unless that would change nothing."""
         from ...preview.renderer import PreviewRenderer  # importable once there is a GPU
-        if self.renderer is None or settings != self._settings or shown.field is not self._field:
+        if self.renderer is None or settings != self._settings or shown.field is not self._field or shown.live != self._live:
             self.close()
             baked = None if shown.baked is None else shown.baked.scene
             begun = scene
-            if baked is not None and not same_light(baked, begun):
+            if baked is not None and shown.live is None and not same_light(baked, begun):
                 begun = replace(begun, lights=baked.lights, world=baked.world)
-            self.renderer = PreviewRenderer(begun, shown.field, settings, (settings.mode,), baked)
-            self._settings, self._field, self._seen = settings, shown.field, None
+            self.renderer = PreviewRenderer(begun, shown.field, settings, (settings.mode,), baked, shown.live)
+            self._settings, self._field, self._live, self._seen = settings, shown.field, shown.live, None
         self.renderer.update(scene)
         if not seen.equals(self._seen) or size != self._size or self.unsettled:
             self.renderer.frame(seen, size)

@@ -1,27 +1,37 @@
-"""Which bake a preview shows: this session's for the chosen technique, or the bundle on disk, or none."""
+"""Which light a preview shows: this session's bake with the chosen technique, what needs no bake, the bundle on disk, or none."""
 
 from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
+import numpy as np
 
 from ...errors import BakeError
 from ...exchange.bundle import read_bundle
 from ...jobs.fingerprint import content_hash
+from ...preview.indirect import live_settings, needs_no_bake
 from ...progress import Progress
 from ...scene import Scene
 from ...techniques import Field, get
+from ...techniques.lpv import TECHNIQUE as LIGHT_PROPAGATION
+from ...techniques.lpv import LpvSettings
+from ...transport.context import changed_surfaces
+from ..properties import scene_settings
 from ..session import Baked, session
+
+LIVE = "Live, without a bake"
 
 
 @dataclass(frozen=True, eq=False)
 class Shown:
     """``field`` is None where nothing fits; ``note`` says for the user what is shown instead, or is empty. ``baked`` is what it can
-    be relit from, for a bake of this session."""
+    be relit from, for a bake of this session. ``live`` are the settings of the technique if its light is made of what is drawn: it
+    needs no bake, and is never out of date."""
 
     field: Field | None
     note: str = ""
     baked: Baked | None = None
+    live: object = None
 
 
 def shown_for(scene: bpy.types.Scene, technique_name: str | None = None) -> Shown:
@@ -29,16 +39,23 @@ def shown_for(scene: bpy.types.Scene, technique_name: str | None = None) -> Show
     technique = get(technique_name or scene.rtgi.technique)
     baked = session.baked.get((scene.name, technique.name))
     if baked is not None:
-        return Shown(baked.field, "", baked)
-    return _from_disk(scene, technique)
+        return Shown(baked.field, "", baked, live_settings(baked.field))
+    settings = scene_settings(scene, technique.name)[1]
+    return Shown(None, LIVE, None, settings) if needs_no_bake(settings) else _from_disk(scene, technique)
 
 
 def lit_for(shown: Shown, scene: Scene, progress: Progress) -> Field | None:
     """The field of ``shown`` under the lamps and the world of ``scene``, for a picture that may not lag behind.
 
-    A field that cannot be relit is taken as it was baked.
+    A field that cannot be relit is taken as it was baked. Of techniques whose light is made of what is drawn, reflective shadow
+    maps are left to the picture, and light propagation volumes are made here, whatever has moved.
     """
     baked = shown.baked
+    if shown.live is not None:
+        if not isinstance(shown.live, LpvSettings):
+            return shown.field
+        if baked is None or changed_surfaces(baked.scene, scene):
+            return LIGHT_PROPAGATION.bake(scene, shown.live, np.random.default_rng(0), progress)
     if baked is None or not hasattr(baked.field, "relight") or same_light(baked.scene, scene):
         return shown.field
     return baked.relight(scene, progress)

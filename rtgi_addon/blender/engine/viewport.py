@@ -16,7 +16,9 @@ STALE = "The bake is out of date"
 
 
 def is_stale(scene, shown: Shown) -> bool:
-    """True if what is shown was baked from ``scene`` when it was another."""
+    """True if what is shown was baked from ``scene`` when it was another, and does not follow it."""
+    if shown.live is not None:
+        return False
     of_this = scene.rtgi.last_bake.technique == scene.rtgi.technique
     return shown.field is not None and of_this and session.stale.get(scene.name, False)
 

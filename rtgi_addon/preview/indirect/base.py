@@ -4,6 +4,7 @@ import gpu
 import numpy as np
 
 from ...scene import Scene
+from ..capture import Drawn
 from ..device import uniform_buffer
 from ..indirect_pass import draw_indirect
 from ..program import Program
@@ -18,6 +19,8 @@ class FieldLight:
     ``includes_direct`` says that the light of lamps is in it already; ``error`` why it does not follow the scene, or None. GPU
     objects: main thread only.
     """
+
+    captures = False
 
     def __init__(self, tables: Tables, includes_direct: bool = False):
         self.includes_direct = includes_direct
@@ -38,6 +41,10 @@ class FieldLight:
     def follow(self, scene: Scene) -> bool:
         """Take the lamps and the world of ``scene``: at once where the technique does it on the GPU, else on a worker, whose light
         comes with ``update``. False if this light cannot fit the scene any more; ``error`` then says why."""
+        raise NotImplementedError
+
+    def capture(self, drawn: Drawn) -> bool:
+        """Take lamps, objects and world of what is drawn, for a light that ``captures``. False if it cannot fit them."""
         raise NotImplementedError
 
     def update(self) -> bool:

@@ -1,23 +1,22 @@
-"""Reflective shadow maps in the preview: when a lamp moves they are drawn and made ready to be sampled on the GPU."""
+"""Reflective shadow maps in the preview: when a lamp or an object moves they are drawn and made ready to be sampled on the GPU."""
 
 from dataclasses import replace
 
 import numpy as np
 
-from ...errors import BakeError
-from ...scene import Scene
 from ...techniques.kernels import NUMPY
-from ...techniques.rsm.field import RsmField
-from ...techniques.rsm.gather import MAX_SLANT, places, shared_samples
+from ...techniques.rsm.field import RsmField, map_views
+from ...techniques.rsm.gather import MAX_SLANT, Pattern, places, shared_samples
+from ...techniques.rsm.settings import RsmSettings
 from ...transport.shadow_views import texel_power
 from ...transport.vectors import luminance
-from ..capture import CapturedTextures, draw_capture
+from ..capture import CapturedTextures, Drawn, draw_capture
 from ..device import dispatch, uniform_buffer
 from ..programs import RSM_QUANTIZE, RSM_STORE, RSM_SUM_ROWS
 from ..textures import empty, upload
 from .base import FieldLight
 from .relighting import RelitLight
-from .rsm import STRUCT, Sheet, least_of, map_rows, pattern_of, pattern_rows, rsm_tables, rsm_values
+from .rsm import STRUCT, Sheet, least_of, map_rows, map_tables, pattern_rows, rsm_values
 from .tables import UNIFORMS
 
 
@@ -25,7 +24,7 @@ def rsm_light(field: RsmField, samples: int | None) -> FieldLight:
     """The irradiance function of ``field``. One whose every sample has a shadow ray is read from its probe grids instead: a shader
     has no rays."""
     if not field.capture.settings.visibility:
-        return RsmLight(field, samples)
+        return RsmLight(field.capture.settings, field.pattern, samples, field.maps)
     from . import grid_tables
 
     def relight(scene, progress):
@@ -35,23 +34,27 @@ def rsm_light(field: RsmField, samples: int | None) -> FieldLight:
     return RelitLight(field, grid_tables, relight)
 
 
+def live_rsm_light(settings: RsmSettings, samples: int | None) -> "RsmLight":
+    """Reflective shadow maps as ``settings`` have them, without any bake: dark before the first capture."""
+    return RsmLight(settings, Pattern(settings.samples, settings.disk_radius, settings.disk_share, 0), samples)
+
+
 class RsmLight(FieldLight):
-    """The maps of ``field``, and then those of the scenes that are followed, with ``samples`` texels a lamp (None: the field's)."""
+    """``maps``, and then those of the scenes that are captured, read by ``pattern``, with ``samples`` texels a lamp (None: the
+    pattern's)."""
 
-    def __init__(self, field: RsmField, samples: int | None = None):
-        super().__init__(rsm_tables(field, samples), field.includes_direct)
-        self._capture, self._pattern, self._least = field.capture, pattern_of(field, samples), least_of(samples)
+    captures = True
 
-    def follow(self, scene: Scene) -> bool:
+    def __init__(self, settings: RsmSettings, pattern: Pattern, samples: int | None = None, maps: tuple = ()):
+        self._settings, self._least = settings, least_of(samples)
+        self._pattern = pattern if samples is None else replace(pattern, samples=samples)
+        super().__init__(map_tables(maps, self._pattern, self._least))
+
+    def capture(self, drawn: Drawn) -> bool:
         """See FieldLight."""
-        try:
-            capture = replace(self._capture, context=self._capture.context.relit(scene))
-        except BakeError as error:
-            self.error = str(error)
-            return False
-        views = [view for own in capture.views(capture.settings) for view in own]
+        views = [view for own in map_views(drawn.scene, drawn.bounds, self._settings) for view in own]
         # By what the lamp sends through each map: what that meets is known to the GPU only.
-        strength = np.array([float(luminance(texel_power(scene.lights[view.lamp], view).sum(axis=(0, 1), dtype=np.float64)))
+        strength = np.array([float(luminance(texel_power(drawn.scene.lights[view.lamp], view).sum(axis=(0, 1), dtype=np.float64)))
                              for view in views])
         views, strength = [view for view, power in zip(views, strength, strict=True) if power > 0], strength[strength > 0]
         counts, before = shared_samples(strength, np.array([view.lamp for view in views], np.intp), self._pattern.samples,
@@ -60,7 +63,7 @@ class RsmLight(FieldLight):
         sheet = Sheet([view.resolution for view in views])
         texels, cumulative = empty(3 * sheet.size[0], sheet.size[1]), empty(*sheet.size, "R32F")
         for view, place in zip(views, sheet.places, strict=True):
-            _store(draw_capture(capture.context, view), place, texels, cumulative)
+            _store(draw_capture(drawn, view), place, texels, cumulative)
         self.samplers = {"texels": texels, "cumulative": cumulative, "maps": upload(map_rows(views, sheet, parts)),
                          "pattern": upload(pattern_rows(parts))}
         self.uniforms = {UNIFORMS: uniform_buffer(STRUCT, rsm_values(len(views), self._pattern))}

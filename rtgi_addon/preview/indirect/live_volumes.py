@@ -13,8 +13,7 @@ from ...techniques.kernels import NUMPY
 from ...techniques.lpv import sources
 from ...techniques.lpv.bake import LpvBake, reflected
 from ...techniques.lpv.grid import LpvGrid
-from ...transport.context import LightContext
-from ..capture import CapturedTextures, draw_capture
+from ..capture import CapturedTextures, Drawn, draw_capture
 from ..device import RenderTarget, bind, dispatch, uniform_buffer, vertex_buffer
 from ..light_volume import FaceTextures, LightTextures, propagate_light, upload_light
 from ..packing import FLUX_SCALE
@@ -51,10 +50,11 @@ class LiveVolumes:
         """The atlases of all cascades, a colour channel each."""
         return _named("light", self._stored)
 
-    def light(self, context: LightContext) -> None:
-        """Fill the volumes for the lamps of ``context``, whose geometry and world are the bake's."""
-        views = sources.map_views(context, self._grids, self._bake.settings.map_resolution)
-        maps = [draw_capture(context, view) for own in views for view in own]
+    def light(self, drawn: Drawn) -> None:
+        """Fill the volumes with what the lamps of ``drawn`` light. Its world is the bake's; where its objects are not, light falls
+        on them where they are, and is blocked and reflected where they were."""
+        views = sources.map_views(drawn.scene, drawn.bounds, self._grids, self._bake.settings.map_resolution)
+        maps = [draw_capture(drawn, view) for own in views for view in own]
         for level in reversed(range(len(self._grids))):
             atlas, (faces, steady, world) = self._stack.atlases[level], self._cascades[level]
             injected = self._inject(level, maps)

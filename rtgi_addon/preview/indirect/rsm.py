@@ -7,6 +7,7 @@ import numpy as np
 from ...numerics.sampling import hash_u32
 from ...techniques.rsm.field import RsmField
 from ...techniques.rsm.gather import MIN_SAMPLES, Pattern, prepare
+from ...transport.reflective_shadow_map import ReflectiveShadowMap
 from ...transport.shadow_views import ShadowView
 from ..packing import fold, map_texels
 from ..uniforms import UniformStruct
@@ -33,8 +34,13 @@ class Sheet:
 
 def rsm_tables(field: RsmField, samples: int | None = None) -> Tables:
     """The maps of ``field``, sampled as it does, or with ``samples`` texels a lamp."""
-    pattern = pattern_of(field, samples)
-    maps = prepare(field.maps, pattern.samples, least_of(samples))
+    pattern = field.pattern if samples is None else replace(field.pattern, samples=samples)
+    return map_tables(field.maps, pattern, least_of(samples))
+
+
+def map_tables(maps: tuple[ReflectiveShadowMap, ...], pattern: Pattern, least: int) -> Tables:
+    """``maps``, read by ``pattern`` with at least so many samples of each."""
+    maps = prepare(maps, pattern.samples, least)
     sheet = Sheet([item.view.resolution for item in maps])
     width, height = sheet.size
     texels, cumulative = np.zeros((height, 3 * width, 4), np.float32), np.zeros((height, width), np.float32)
@@ -46,11 +52,6 @@ def rsm_tables(field: RsmField, samples: int | None = None) -> Tables:
     return Tables("indirect_rsm", STRUCT, rsm_values(len(maps), pattern),
                   {"texels": texels, "cumulative": cumulative, "maps": map_rows([item.view for item in maps], sheet, parts),
                    "pattern": pattern_rows(parts)})
-
-
-def pattern_of(field: RsmField, samples: int | None) -> Pattern:
-    """How ``field`` chooses texels, with another number of ``samples`` if one is given."""
-    return field.pattern if samples is None else replace(field.pattern, samples=samples)
 
 
 def least_of(samples: int | None) -> int:

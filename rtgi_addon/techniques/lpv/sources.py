@@ -9,10 +9,11 @@ from ...numerics import sh
 from ...numerics.grid import lattice_points
 from ...numerics.sampling import fibonacci_sphere, r2, sobol_owen
 from ...progress import Progress
+from ...scene import Scene
 from ...transport.context import LightContext
 from ...transport.parallel import CHUNK, chunks, parallel_for
 from ...transport.reflective_shadow_map import ReflectiveShadowMap
-from ...transport.shadow_views import ShadowView, views_of
+from ...transport.shadow_views import ShadowView, lit_views
 from .gather import FACE_TOTAL, intensity_of_radiance
 from .grid import FRONT_SOLID_ANGLE, SIDE_SOLID_ANGLE, LpvGrid
 
@@ -30,18 +31,20 @@ class Lights(NamedTuple):
     flux: np.ndarray
 
 
-def map_views(context: LightContext, grids: tuple[LpvGrid, ...], resolution: int) -> list[tuple[ShadowView, ...]]:
-    """Each lamp's views, ``resolution`` texels a side or fewer if they are many; a sun's is fitted to the coarsest volume."""
+def map_views(scene: Scene, bounds: np.ndarray, grids: tuple[LpvGrid, ...], resolution: int) -> list[tuple[ShadowView, ...]]:
+    """Each lamp's views of ``scene``, whose geometry has ``bounds`` (2, 3), ``resolution`` texels a side or fewer if they are many;
+    a sun's is fitted to the coarsest volume."""
     outermost = grids[-1]
     box = np.stack([np.asarray(outermost.corner) - outermost.cell, outermost.high + outermost.cell])
-    bounds = np.array(context.geometry.bounds(), np.float64)
     focus = np.stack([np.maximum(box[0], bounds[0]), np.minimum(box[1], bounds[1])])
     if np.any(focus[0] > focus[1]):
         focus = box
-    views = [views_of(context, lamp, resolution, focus=focus) for lamp in range(context.lamps.count)]
+    views = [lit_views(light, bounds, resolution, lamp, focus=focus) for lamp, light in enumerate(scene.lights)]
     fitting = np.sqrt(MAX_TEXELS / max(sum(map(len, views)), 1))
     fewer = int(np.clip(fitting, min(resolution, MIN_RESOLUTION), resolution))
-    return views if fewer == resolution else [views_of(context, lamp, fewer, focus=focus) for lamp in range(len(views))]
+    if fewer == resolution:
+        return views
+    return [lit_views(light, bounds, fewer, lamp, focus=focus) for lamp, light in enumerate(scene.lights)]
 
 
 def capture_maps(context: LightContext, kernels, grids: tuple[LpvGrid, ...], resolution: int,
@@ -51,9 +54,9 @@ def capture_maps(context: LightContext, kernels, grids: tuple[LpvGrid, ...], res
     Raises BakeError naming a lamp that lights surfaces, but none within the volumes, and if no lamp lights any and nothing else
     shines.
     """
-    outermost = grids[-1]
+    outermost, bounds = grids[-1], np.array(context.geometry.bounds(), np.float64)
     maps = []
-    for lamp, views in enumerate(map_views(context, grids, resolution)):
+    for lamp, views in enumerate(map_views(context.scene, bounds, grids, resolution)):
         progress.step(lamp / context.lamps.count, "capturing reflective shadow maps")
         own = [kernels.capture(context, view) for view in views]
         lit = [captured.lights() for captured in own]

@@ -10,7 +10,7 @@ from ...progress import Progress
 from ...scene import Scene
 from ...transport.context import LightContext
 from ...transport.reflective_shadow_map import ReflectiveShadowMap
-from ...transport.shadow_views import ShadowView, texel_power, views_of
+from ...transport.shadow_views import ShadowView, lit_views, texel_power
 from ..base import Field, ProbeGrid, volumes_by_settings
 from ..kernels import NUMPY, Kernels
 from ..resample import MAX_QUADRATURE_ORDER, resample
@@ -19,6 +19,27 @@ from .settings import RsmSettings
 
 # A texel with what the gather adds to it; maps of all lamps together must stay below the limit [bytes].
 TEXEL_BYTES, MAX_BYTES = 96, 4 << 30
+
+
+def map_views(scene: Scene, bounds: np.ndarray, settings: RsmSettings) -> list[tuple[ShadowView, ...]]:
+    """Each lamp's views of ``scene``, whose geometry has ``bounds`` (2, 3); all maps of a lamp together have the texels of one
+    square."""
+    focus = _focus(scene, bounds, settings.focus)
+    views = [lit_views(light, bounds, settings.resolution, lamp, focus=focus, area_points=settings.area_points)
+             for lamp, light in enumerate(scene.lights)]
+    sides = [max(4, round(settings.resolution / max(len(own), 1) ** 0.5)) for own in views]
+    return [tuple(replace(view, resolution=side) for view in own) for own, side in zip(views, sides, strict=True)]
+
+
+def _focus(scene: Scene, bounds: np.ndarray, scale: float) -> np.ndarray | None:
+    """The box (2, 3) that a sun's map must cover: around all volumes, ``scale`` times as large, cut to the scene."""
+    cube = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    corners = np.concatenate([cube @ np.asarray(volume.world_from_local)[:3, :3].T + np.asarray(volume.world_from_local)[:3, 3]
+                              for volume in scene.volumes])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    grown = 0.5 * (low + high) + 0.5 * scale * np.array([low - high, high - low])
+    cut = np.stack([np.maximum(grown[0], bounds[0]), np.minimum(grown[1], bounds[1])])
+    return cut if np.all(cut[0] <= cut[1]) else None
 
 
 class LampMaps:
@@ -89,15 +110,9 @@ class Capture:
             grids |= {id(grid.volume): grid for grid in made}
         return RsmField(self, maps[self.settings], tuple(grids[id(volume)] for volume in self.context.scene.volumes))
 
-    def views(self, settings: RsmSettings) -> list[tuple[ShadowView, ...]]:
-        """Each lamp's views; all maps of a lamp together have the texels of one square."""
-        views = [views_of(self.context, lamp, settings.resolution, focus=self._focus(settings.focus),
-                          area_points=settings.area_points) for lamp in range(len(self.context.scene.lights))]
-        sides = [max(4, round(settings.resolution / max(len(own), 1) ** 0.5)) for own in views]
-        return [tuple(replace(view, resolution=side) for view in own) for own, side in zip(views, sides, strict=True)]
-
     def _capture(self, settings: RsmSettings, progress: Progress) -> tuple[ReflectiveShadowMap, ...]:
-        lights, views = self.context.scene.lights, self.views(settings)
+        scene, bounds = self.context.scene, np.array(self.context.geometry.bounds(), np.float64)
+        lights, views = scene.lights, map_views(scene, bounds, settings)
         able = sum(1 for own in views if own)
         if able == 0:
             raise BakeError("the scene has no lamp with any power to capture a reflective shadow map from",
@@ -114,17 +129,6 @@ class Capture:
             names = ", ".join(repr(light.name) for light in lights)
             raise BakeError(f"no surface is lit by {names}", "move the lamps to where they light something, or turn them to it")
         return tuple(maps)
-
-    def _focus(self, scale: float) -> np.ndarray | None:
-        """The box (2, 3) that a sun's map must cover: around all volumes, ``scale`` times as large, cut to the scene."""
-        cube = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
-        corners = np.concatenate([cube @ np.asarray(volume.world_from_local)[:3, :3].T + np.asarray(volume.world_from_local)[:3, 3]
-                                  for volume in self.context.scene.volumes])
-        low, high = corners.min(axis=0), corners.max(axis=0)
-        grown = 0.5 * (low + high) + 0.5 * scale * np.array([low - high, high - low])
-        bounds = np.array(self.context.geometry.bounds(), np.float64)
-        cut = np.stack([np.maximum(grown[0], bounds[0]), np.minimum(grown[1], bounds[1])])
-        return cut if np.all(cut[0] <= cut[1]) else None
 
 
 class RsmField(Field):
