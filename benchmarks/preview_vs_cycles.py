@@ -16,9 +16,10 @@ between the baked field and the path reference at the points that a coarse grid 
 the renderer's.
 
 What Cycles and EEVEE rendered is kept in benchmarks/results for later runs of that size with no more samples (``--again``
-renders anew). A sheet a sample goes to benchmarks/results/preview_SAMPLE.png: RTGI, EEVEE after a bake of its own volumes, and
-Cycles; below, the indirect light of RTGI, the signed difference, and the indirect light of Cycles. ``--overview FILE.jpg`` puts
-the first row of all into one picture.
+renders anew). A sheet a sample goes to benchmarks/results/preview_SAMPLE.png: RTGI, EEVEE after a bake of its own volumes
+(grown by one of their cells on every side, without which EEVEE shows the world on walls that a volume ends at), and Cycles; below,
+the indirect light of RTGI, the signed difference, and the indirect light of Cycles. ``--overview FILE.jpg`` puts the first row of
+all into one picture.
 """
 
 import argparse
@@ -138,18 +139,21 @@ def render_cycles(name: str, size, samples: int, threads: int | None) -> dict:
 
 
 def render_eevee(name: str, size, samples: int) -> np.ndarray:
-    """EEVEE's picture (h, w, 3) of the sample with its volumes baked, row 0 at the top."""
+    """EEVEE's picture (h, w, 3) of the sample with its volumes, grown by a cell, baked; row 0 at the top."""
     scene = open_sample(name, size)
     engines = {item.identifier for item in bpy.types.RenderSettings.bl_rna.properties["engine"].enum_items}
     scene.render.engine = next((engine for engine in ("BLENDER_EEVEE_NEXT", "BLENDER_EEVEE") if engine in engines), "BLENDER_EEVEE")
     scene.eevee.taa_render_samples = samples
+    for probe in (obj for obj in scene.objects if obj.type == "LIGHT_PROBE" and obj.data.type == "VOLUME"):
+        # Up to 1.25 cells within a volume's border EEVEE dithers it with what lies outside, here the world.
+        counts = [getattr(probe.data, f"resolution_{axis}") for axis in "xyz"]
+        probe.scale = [scale * (count + 2) / count for scale, count in zip(probe.scale, counts, strict=True)]
+        for axis, count in zip("xyz", counts, strict=True):
+            setattr(probe.data, f"resolution_{axis}", count + 2)
+    bpy.context.view_layer.update()
     bpy.ops.object.lightprobe_cache_bake(subset="ALL")
     with tempfile.TemporaryDirectory() as folder:
-        # A render takes what was baked from the file, not from the session that baked it.
-        path = str(Path(folder) / "baked.blend")
-        bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
-        bpy.ops.wm.open_mainfile(filepath=path)
-        return _render(bpy.context.scene, folder)["Combined"]
+        return _render(scene, folder)["Combined"]
 
 
 def _render(scene, folder) -> dict[str, np.ndarray]:
@@ -260,7 +264,7 @@ def compare(name: str, options, say) -> tuple[list[dict], list]:
     signed = np.where(seen, (luminance(found["combined"]) - luminance(true)) / np.maximum(luminance(true), 0.1 * level), 0.0)
     best = 100 * (results[-1]["combined"]["difference"] or 0.0)
     first = [(f"{name}: RTGI, {results[-1]['probes']:,} probes, {best:.1f} %", displayed(found["combined"])),
-             ("EEVEE, its volume not shown (see README)", None if eevee is None else displayed(eevee)), ("Cycles", displayed(true))]
+             ("EEVEE, its volume baked", None if eevee is None else displayed(eevee)), ("Cycles", displayed(true))]
     below = [("RTGI, indirect", displayed(found["indirect"])), ("RTGI less Cycles (full colour: 25 %)", signed_colours(signed)),
              ("Cycles, indirect", displayed(cycles["indirect"].mean(axis=0)))]
     sheet([first, below], RESULTS / f"preview_{name}.png")
