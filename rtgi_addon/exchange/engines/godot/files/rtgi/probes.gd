@@ -1,0 +1,128 @@
+@tool
+extends Node3D
+## Lights what is below [member target] by RTGI's probes, in the editor and in the game.
+##
+## Meshes whose GI mode is Dynamic keep their materials and are lit as a whole, by the LightmapGIData of the child node. All others
+## are lit at every pixel: a ShaderMaterial that includes irradiance.gdshaderinc gets its uniforms, a StandardMaterial3D without
+## transparency is drawn with surface.gdshader in its place. Nothing of that is saved into the scene.
+
+const Volumes := preload("volumes.gd")
+const ONE_SIDED := preload("surface.gdshader")
+const DOUBLE_SIDED := preload("surface_double_sided.gdshader")
+
+## The part of the scene that is lit.
+@export var target: NodePath = ^".."
+## Draw StandardMaterial3D with surface.gdshader; off: only your own shaders are set up.
+@export var convert_materials := true
+
+var volumes := Volumes.new()
+var _converted := {}  # BaseMaterial3D -> the ShaderMaterial that stands in for it
+var _shown: Array[ShaderMaterial] = []  # every material that was given the uniforms
+
+
+func _ready() -> void:
+	if volumes.open((get_script() as Script).resource_path.get_base_dir()) != OK:
+		return
+	volumes.world_from_local = global_transform
+	set_notify_transform(true)
+	get_tree().node_added.connect(_on_node_added)
+	refresh()
+
+
+func _notification(what: int) -> void:
+	if what == NOTIFICATION_TRANSFORM_CHANGED and is_node_ready():
+		volumes.world_from_local = global_transform
+		for material in _shown:
+			volumes.apply_to(material)
+
+
+## Looks for meshes and materials again: call it after materials were replaced.
+func refresh() -> void:
+	var root := get_node_or_null(target)
+	if root is MeshInstance3D:
+		_light(root)
+	if root != null:
+		for node in root.find_children("*", "MeshInstance3D", true, false):
+			_light(node)
+
+
+func _on_node_added(node: Node) -> void:
+	var root := get_node_or_null(target)
+	if node is MeshInstance3D and root != null and root.is_ancestor_of(node):
+		_light.call_deferred(node)
+
+
+func _light(mesh: MeshInstance3D) -> void:
+	if not is_instance_valid(mesh) or mesh.mesh == null or mesh.gi_mode == GeometryInstance3D.GI_MODE_DYNAMIC:
+		return
+	for surface in mesh.mesh.get_surface_count():
+		var material := mesh.get_active_material(surface)
+		if material is ShaderMaterial:
+			_show(material)
+			continue
+		var stand_in := _stand_in(material)
+		if stand_in == null:
+			continue
+		if mesh.material_override != null:
+			RenderingServer.instance_geometry_set_material_override(mesh.get_instance(), stand_in.get_rid())
+		else:
+			RenderingServer.instance_set_surface_override_material(mesh.get_instance(), surface, stand_in.get_rid())
+
+
+func _show(material: ShaderMaterial) -> void:
+	if material not in _shown and material.shader != null and material.get_shader_parameter("rtgi_ready") != true:
+		for uniform in material.shader.get_shader_uniform_list():
+			if uniform["name"] == "rtgi_ready":
+				_shown.append(material)
+				volumes.apply_to(material)
+				return
+
+
+## The material that is drawn for a StandardMaterial3D or ORMMaterial3D (none: the engine's default), or null to leave it alone.
+func _stand_in(material: Material) -> ShaderMaterial:
+	if not convert_materials:
+		return null
+	if _converted.has(material):
+		return _converted[material]
+	var source := material as BaseMaterial3D
+	if material != null and (source == null or source.transparency != BaseMaterial3D.TRANSPARENCY_DISABLED
+			or source.shading_mode == BaseMaterial3D.SHADING_MODE_UNSHADED):
+		return null
+	if source == null:
+		source = StandardMaterial3D.new()
+	var result := ShaderMaterial.new()
+	result.shader = DOUBLE_SIDED if source.cull_mode == BaseMaterial3D.CULL_DISABLED else ONE_SIDED
+	var orm := source is ORMMaterial3D
+	var parameters := {
+		"albedo": source.albedo_color, "albedo_texture": source.albedo_texture,
+		"metallic": 1.0 if orm else source.metallic,
+		"metallic_texture": source.orm_texture if orm else source.metallic_texture,
+		"metallic_channel": _channel(BaseMaterial3D.TEXTURE_CHANNEL_BLUE if orm else source.metallic_texture_channel),
+		"roughness": 1.0 if orm else source.roughness,
+		"roughness_texture": source.orm_texture if orm else source.roughness_texture,
+		"roughness_channel": _channel(BaseMaterial3D.TEXTURE_CHANNEL_GREEN if orm else source.roughness_texture_channel),
+		"specular": source.metallic_specular,
+		"normal_mapped": source.normal_enabled and source.normal_texture != null,
+		"normal_scale": source.normal_scale, "normal_texture": source.normal_texture,
+		"vertex_colors": source.vertex_color_use_as_albedo,
+		"uv_scale": source.uv1_scale, "uv_offset": source.uv1_offset,
+	}
+	if source.emission_enabled:
+		parameters["emission"] = source.emission
+		parameters["emission_energy"] = source.emission_energy_multiplier
+		parameters["emission_texture"] = source.emission_texture
+	for parameter: String in parameters:
+		if parameters[parameter] != null:
+			result.set_shader_parameter(parameter, parameters[parameter])
+	_converted[material] = result
+	_shown.append(result)
+	volumes.apply_to(result)
+	return result
+
+
+static func _channel(channel: BaseMaterial3D.TextureChannel) -> Vector4:
+	if channel == BaseMaterial3D.TEXTURE_CHANNEL_GRAYSCALE:
+		return Vector4(1.0, 1.0, 1.0, 0.0) / 3.0
+	var result := Vector4.ZERO
+	result[channel] = 1.0
+	return result

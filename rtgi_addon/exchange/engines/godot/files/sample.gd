@@ -1,0 +1,67 @@
+extends Node3D
+## model.glb under the probes' light, or white balls at the probes where there is no model; a dynamic ball flies through.
+
+const MODEL := "res://model.glb"
+const MOST_BALLS := 512
+
+@onready var probes: Node3D = $Probes
+
+var _path: Array[Vector3] = []
+
+
+func _ready() -> void:
+	var index: Dictionary = JSON.parse_string(FileAccess.get_file_as_string("res://rtgi/probes.json"))
+	if ResourceLoader.exists(MODEL):
+		var model: Node = (load(MODEL) as PackedScene).instantiate()
+		add_child(model)
+		# The probes hold what such lamps give.
+		if index["includes_direct"]:
+			for lamp in model.find_children("*", "Light3D", true, false):
+				lamp.queue_free()
+		for camera: Camera3D in model.find_children("*", "Camera3D", true, false):
+			camera.make_current()
+			break
+	else:
+		_add_balls()
+	if get_viewport().get_camera_3d() == $Camera:
+		_frame_volumes()
+	probes.refresh()
+
+
+func _process(_delta: float) -> void:
+	if _path.is_empty():
+		for volume in probes.volumes.volumes:
+			var size := Vector3(volume.size.x, volume.size.y, volume.size.z)
+			for corner: Vector3 in [Vector3(0.3, 0.3, 0.3), Vector3(0.7, 0.3, 0.4), Vector3(0.7, 0.6, 0.7), Vector3(0.3, 0.5, 0.6)]:
+				_path.append(volume.centre + volume.offset_from_lattice * (corner * size - Vector3(0.5, 0.5, 0.5)))
+	if not _path.is_empty():
+		var time := Time.get_ticks_msec() / 2000.0
+		var leg := int(time) % _path.size()
+		$Ball.position = _path[leg].lerp(_path[(leg + 1) % _path.size()], smoothstep(0.0, 1.0, fposmod(time, 1.0)))
+
+
+func _add_balls() -> void:
+	var count := 0
+	for volume in probes.volumes.volumes:
+		var ball := SphereMesh.new()
+		ball.radius = 0.2 * volume.offset_from_lattice.basis.get_scale().abs()[volume.offset_from_lattice.basis.get_scale().min_axis_index()]
+		ball.height = 2.0 * ball.radius
+		for z in volume.size.z:
+			for y in volume.size.y:
+				for x in volume.size.x:
+					if count < MOST_BALLS:
+						var instance := MeshInstance3D.new()
+						instance.mesh = ball
+						instance.position = volume.centre + volume.offset_from_lattice * Vector3(x, y, z)
+						add_child(instance)
+						count += 1
+
+
+func _frame_volumes() -> void:
+	var box := AABB()
+	for volume in probes.volumes.volumes:
+		var size := Vector3(volume.size.x, volume.size.y, volume.size.z)
+		var own: AABB = volume.offset_from_lattice * AABB(Vector3(-0.5, -0.5, -0.5), size)
+		own.position += volume.centre
+		box = own if box.size == Vector3.ZERO else box.merge(own)
+	$Camera.look_at_from_position(box.get_center() + box.size.length() * Vector3(0.6, 0.5, 0.9), box.get_center())
