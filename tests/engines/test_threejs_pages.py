@@ -1,0 +1,87 @@
+"""The pages of an export to three.js, in Chromium on a software GPU: the conformance page, and the demo beside our own picture."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rtgi_addon.exchange import engines
+from rtgi_addon.exchange.bundle import read_bundle
+from rtgi_addon.exchange.engines import ExportSettings
+
+pytestmark = pytest.mark.slow
+ROOT = Path(__file__).resolve().parents[2]
+CORNELL = ROOT / "sample_blends/cornell_box.blend"
+SIZE = 480
+
+
+def rtgi(*words):
+    """Run a subcommand on the Cornell box."""
+    ran = subprocess.run([sys.executable, "-m", "rtgi_addon", CORNELL, *map(str, words)], cwd=ROOT, capture_output=True,
+                         text=True, timeout=300, check=False)
+    assert ran.returncode == 0, ran.stderr
+
+
+@pytest.fixture(scope="module")
+def cornell(tmp_path_factory):
+    """The Cornell box baked with direct light, and as a model: the bundle and the .glb."""
+    bpy = pytest.importorskip("bpy", reason="needs Blender or its Python module")
+    if not bpy.app.module:
+        pytest.skip("the module's door needs the module: this is a real Blender")
+    folder = tmp_path_factory.mktemp("cornell")
+    rtgi("bake", "--direct", "--out", folder / "bundle", "--rays", 256)
+    bpy.ops.wm.open_mainfile(filepath=str(CORNELL))
+    bpy.ops.export_scene.gltf(filepath=str(folder / "model.glb"), export_format="GLB", export_cameras=True, export_lights=True,
+                              export_import_convert_lighting_mode="COMPAT")
+    return folder / "bundle", folder / "model.glb"
+
+
+@pytest.mark.parametrize("release", ["three", "three-oldest"])
+def test_the_gpu_agrees(browse, install_three, export, release):
+    page = browse(install_three(export, release), "conformance.html")
+    assert page["state"] == "passed" and page["shown"].count("pass  ") == 13, page
+    assert not [message for message in page["messages"] if message.startswith("error")], page
+
+
+def test_the_gpu_finds_damage(browse, install_three, export):
+    """The page fails where the shader does: without the Chebyshev bound here."""
+    shader = install_three(export) / "rtgi" / "shader.js"
+    text = shader.read_text()
+    assert "behind > 0.0 ? bound * bound * bound : 1.0" in text
+    shader.write_text(text.replace("behind > 0.0 ? bound * bound * bound : 1.0", "1.0"))
+    page = browse(export, "conformance.html")
+    assert page["state"] == "failed" and "FAIL  visibility" in page["shown"] and "pass  known content" in page["shown"], page
+
+
+@pytest.mark.parametrize("page", ["index.html", "conformance.html"])
+def test_without_three_the_pages_say_what_to_do(browse, export, page):
+    shown = browse(export, page)
+    assert shown["state"] == "failed" and "npm install" in shown["shown"], shown
+
+
+def test_without_a_model_balls_show_the_probes(browse, install_three, export, tmp_path):
+    page = browse(install_three(export), "index.html", picture=str(tmp_path / "picture.raw"))
+    assert page["state"] == "ready" and not [text for text in page["messages"] if text.startswith("error")], page
+    picture = np.fromfile(tmp_path / "picture.raw", np.float32)
+    assert np.isfinite(picture).all() and (picture > 0.01).mean() > 0.05
+
+
+def test_the_demo_beside_our_picture(gpu_device, cornell, browse, install_three, tmp_path):
+    """Mean relative difference in linear light of the Cornell box in its probes' light, from its camera: edges included."""
+    from rtgi_addon.exchange.exr import read_exr
+    bundle, model = cornell
+    export = engines.get("threejs").export(read_bundle(bundle), tmp_path / "export", ExportSettings(model=model)).out
+    page = browse(install_three(export), "index.html", SIZE, SIZE, picture=str(tmp_path / "three.raw"),
+                  screenshot=str(tmp_path / "three.png"))
+    assert page["state"] == "ready" and not [text for text in page["messages"] if text.startswith("error")], page
+    theirs = np.fromfile(tmp_path / "three.raw", np.float32).reshape(SIZE, 2, SIZE, 2, 3).mean(axis=(1, 3))[::-1]
+    rtgi("render", "--bundle", bundle, "--pass", "indirect", "--samples", 8, "--out", tmp_path / "ours.exr")
+    planes, _ = read_exr(tmp_path / "ours.exr")
+    ours = np.stack([planes[name] for name in "RGB"], axis=-1)
+    difference = np.abs(theirs - ours)
+    assert difference.mean() < 0.01 * ours.mean()
+    # Away from the edges of things nothing but the halves is left.
+    assert np.median(difference[ours > 0]) < 1e-3 * ours.mean()
+    assert abs(theirs.mean() / ours.mean() - 1.0) < 2e-3
