@@ -135,7 +135,8 @@ class PreviewRenderer:
         offset = filter_offset(sobol_owen(1, 2, _FILTER_SEED, start=index)[0]) if index else np.zeros(2)
         self._gbuffer.draw(self._surfaces, view.drawn(scaled, offset, index))
         inputs = {**self._gbuffer.textures, "direct": self._direct, "irradiance": self._irradiance}
-        if self._surfaces is not None:
+        # A bake that holds the lamps' light would be lit twice.
+        if self._surfaces is not None and not self._indirect.includes_direct:
             self._lamps.draw(self.scene, self._surfaces, self._bounds, view, index, inputs, self._direct)
         draw_indirect(self._indirect, inputs, self._irradiance)
         self._film.add(view, offset, inputs, self._background, self.settings.film_transparent)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import scene_builders as build
 
+from rtgi_addon.progress import Progress
 from rtgi_addon.scene import Material, PointLight, World
 from rtgi_addon.transport.context import LightContext
 from rtgi_addon.transport.environment import Environment
@@ -135,6 +136,22 @@ def test_edges_settle_to_coverage(gpu_device):
     fine.frame(view(), (SIZE[0] * 8, SIZE[1] * 8))
     assert 0.01 < np.mean((coarse > 0.1) & (coarse < 0.9))
     assert coarse.mean() == pytest.approx(fine.image("combined")[..., 0].mean(), rel=0.02)
+
+
+def test_lamps_that_the_bake_holds_are_not_added_again(gpu_device):
+    from rtgi_addon import techniques
+    from rtgi_addon.preview.renderer import PreviewRenderer
+    scene = stage(volumes=(build.volume("room", half_size=(1.5, 1.5, 1.0), center=(0.0, 0.0, 1.0)),))
+    method = techniques.get("probes")
+    light = {}
+    for direct in (False, True):
+        field = method.bake(scene, method.Settings(rays=64, direct=direct), np.random.default_rng(1), Progress())
+        result = PreviewRenderer(scene, field, passes=("direct", "irradiance"))
+        result.frame(view(), SIZE)
+        light[direct] = {name: result.image(name)[..., :3] for name in ("direct", "irradiance")}
+        result.close()
+    assert light[False]["direct"].max() > 0.1 and not light[True]["direct"].any()
+    assert light[True]["irradiance"].mean() > 1.5 * light[False]["irradiance"].mean()
 
 
 def test_another_view_size_or_scale_begins_anew(gpu_device):
