@@ -141,7 +141,7 @@ def test_edges_settle_to_coverage(gpu_device):
 def test_lamps_that_the_bake_holds_are_not_added_again(gpu_device):
     from rtgi_addon import techniques
     from rtgi_addon.preview.renderer import PreviewRenderer
-    scene = stage(volumes=(build.volume("room", half_size=(1.5, 1.5, 1.0), center=(0.0, 0.0, 1.0)),))
+    scene = stage(0.0, volumes=(build.volume("room", half_size=(1.5, 1.5, 1.0), center=(0.0, 0.0, 1.0)),))
     method = techniques.get("probes")
     light = {}
     for direct in (False, True):
