@@ -60,12 +60,12 @@ def cases(field: ProbeField, axes: Axes) -> tuple[Case, ...]:
     known = _known_grid().volume
     probes = lattice.lattice_points(known.world_from_local, known.resolution).reshape(-1, 3)
     return (
-        _case("known content", "a constant, six lobes along the axes, each single coefficient: at the probes", KIT, kit, axes,
-              probes[np.arange(POINTS) % len(probes)], rng),
-        _case("between known probes", "the same, blended", KIT, kit, axes, _inside(known, POINTS, rng), rng),
-        _case("visibility", "rotated, non-cubic and overlapping volumes, walls, probes moved and inside geometry, points outside",
-              KIT, kit, axes, np.concatenate([_inside(grid.volume, POINTS // 2, rng, 1.15) for grid in kit.grids()[1:]]), rng),
-        _case("bundle", "the volumes of this export", BUNDLE, field, axes, _spread(field, rng), rng),
+        case("known content", "a constant, six lobes along the axes, each single coefficient: at the probes", KIT, kit, axes,
+             probes[np.arange(POINTS) % len(probes)], rng),
+        case("between known probes", "the same, blended", KIT, kit, axes, _inside(known, POINTS, rng), rng),
+        case("visibility", "rotated, non-cubic and overlapping volumes, walls, probes moved and inside geometry, points outside",
+             KIT, kit, axes, np.concatenate([_inside(grid.volume, POINTS // 2, rng, 1.15) for grid in kit.grids()[1:]]), rng),
+        case("bundle", "the volumes of this export", BUNDLE, field, axes, _spread(field, rng), rng),
     )
 
 
@@ -74,7 +74,8 @@ def to_json(field: ProbeField, axes: Axes) -> dict:
     return {"schema": SCHEMA, "unit": "W/m^2", "cases": [case.to_json() for case in cases(field, axes)]}
 
 
-def _case(name: str, description: str, volumes: str, field: ProbeField, axes: Axes, points: np.ndarray, rng) -> Case:
+def case(name: str, description: str, volumes: str, field: ProbeField, axes: Axes, points: np.ndarray, rng) -> Case:
+    """What ``field`` says at ``points`` (n, 3) of Blender's world and at normals that ``rng`` draws."""
     normals = _unit(rng.normal(size=points.shape)).astype(np.float32)
     # The engine reads float32 positions in its own axes: what is asked of ours is the very same points.
     points_engine = axes.vectors(points).astype(np.float32)

@@ -1,4 +1,4 @@
-"""three.js: one .json and one .bin of probes, a loader with a hook for lit materials and a twin on the CPU, and pages that show both.
+"""three.js: one .json and one .bin of probes, a loader with a hook for lit materials and a twin on the CPU, and pages for both.
 
 `export/` holds what every export gets as it is: plain ES modules that need no bundler. The loader's look-up on the GPU and the one
 on the CPU are twins of `techniques/probes/lookup.py`; `conformance.html` and `conformance.mjs` hold them to it.
@@ -19,8 +19,8 @@ from .light_probe import light_probe_case
 from .probes_file import write_probes
 
 _FILES = Path(__file__).parent / "export"
-_FOR_EVERY = ("README.md", "package.json", "index.html", "demo.js", "rtgi/RTGIProbeVolumes.js", "rtgi/RTGIProbeVolumes.d.ts", "rtgi/lookup.js",
-              "rtgi/shader.js")
+_FOR_EVERY = ("README.md", "package.json", "index.html", "demo.js", "rtgi/RTGIProbeVolumes.js", "rtgi/RTGIProbeVolumes.d.ts",
+              "rtgi/lookup.js", "rtgi/shader.js")
 _FOR_CONFORMANCE = ("conformance.mjs", "conformance.html", "conformance/compare.js", "conformance/page.js")
 _MODEL = "model.glb"
 

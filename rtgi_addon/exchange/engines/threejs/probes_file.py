@@ -23,7 +23,10 @@ _STEPS = 65535.0
 
 
 def write_probes(path: Path, field: ProbeField, volumes: tuple[ExportVolume, ...], scene: str) -> None:
-    """Write ``volumes`` of ``field`` as ``path``, a .json, and the .bin beside it. Raises BakeError for light beyond halves, OSError."""
+    """Write ``volumes`` of ``field`` as ``path``, a .json, and the .bin beside it.
+
+    Raises BakeError for light beyond what halves hold, OSError for a disk that refuses.
+    """
     tiles = [_tiles(volume) for volume in volumes]
     data = b"".join([*(_probes(volume).tobytes() for volume in volumes), *(stored.tobytes() for stored, _ in tiles)])
     path.parent.mkdir(parents=True, exist_ok=True)
