@@ -27,7 +27,7 @@ def sky_courtyard():
         x = -3.2 + 1.6 * i
         kit.box(f"Pillar {i + 1}", (x - 0.12, 1.74, -0.05), (x + 0.12, 1.98, 2.45), stone)
     kit.box("Bench", (2.6, -1.2, -0.05), (3.1, 0.8, 0.45), brick)
-    kit.probe_volume("Probes", (-4.0, -3.0, 0.0), (4.0, 3.0, 3.5), (6, 5, 3))
+    kit.probe_volume("Probes", (-4.0, -3.0, 0.0), (4.0, 3.0, 3.5), (18, 15, 9))
     kit.camera((3.7, -2.7, 2.5), (-1.6, 1.4, 0.7), lens=18.0)
 
 
@@ -49,7 +49,7 @@ def sun_window():
     kit.box("Bed", (-1.9, -1.4, -0.05), (-0.3, -0.2, 0.45), cloth)
     kit.box("Chest", (-1.4, 0.9, -0.05), (-0.4, 1.4, 0.8), wood)
     kit.lamp("Sun", "SUN", (6.0, 2.0, 5.0), 25.0, (1.0, 0.93, 0.82), target=(-0.2, -0.2, 0.0), angle=math.radians(0.53))
-    kit.probe_volume("Probes", (-2.0, -1.5, 0.0), (2.0, 1.5, 2.6), (5, 4, 3))
+    kit.probe_volume("Probes", (-2.0, -1.5, 0.0), (2.0, 1.5, 2.6), (15, 12, 9))
     kit.camera((-1.75, 0.6, 1.75), (1.2, -0.35, 0.75), lens=16.0)
 
 
