@@ -23,6 +23,8 @@ func _ready() -> void:
 			break
 	else:
 		_add_balls()
+	var finest: Vector3 = probes.volumes.volumes[0].offset_from_lattice.basis.get_scale().abs()
+	$Ball.scale = Vector3.ONE * minf(finest.x, minf(finest.y, finest.z))
 	if get_viewport().get_camera_3d() == $Camera:
 		_frame_volumes()
 	probes.refresh()
@@ -43,25 +45,41 @@ func _process(_delta: float) -> void:
 func _add_balls() -> void:
 	var count := 0
 	for volume in probes.volumes.volumes:
+		var cell: Vector3 = volume.offset_from_lattice.basis.get_scale().abs()
 		var ball := SphereMesh.new()
-		ball.radius = 0.2 * volume.offset_from_lattice.basis.get_scale().abs()[volume.offset_from_lattice.basis.get_scale().min_axis_index()]
+		ball.radius = 0.2 * minf(cell.x, minf(cell.y, cell.z))
 		ball.height = 2.0 * ball.radius
 		for z in volume.size.z:
 			for y in volume.size.y:
 				for x in volume.size.x:
 					if count < MOST_BALLS:
-						var instance := MeshInstance3D.new()
-						instance.mesh = ball
-						instance.position = volume.centre + volume.offset_from_lattice * Vector3(x, y, z)
-						add_child(instance)
+						_show(ball, volume.centre + volume.offset_from_lattice * Vector3(x, y, z))
 						count += 1
+	var box := _box()
+	var floor_mesh := PlaneMesh.new()
+	floor_mesh.size = 1.5 * Vector2(box.size.x, box.size.z)
+	_show(floor_mesh, box.get_center() - Vector3(0.0, 0.5 * box.size.y, 0.0))
+
+
+func _show(mesh: Mesh, place: Vector3) -> void:
+	var instance := MeshInstance3D.new()
+	instance.mesh = mesh
+	instance.position = place
+	add_child(instance)
 
 
 func _frame_volumes() -> void:
+	var box := _box()
+	var direction := Vector3(0.5, 0.35, 0.8).normalized()
+	$Camera.look_at_from_position(box.get_center() + box.size.length() * direction, box.get_center())
+
+
+## Around all volumes.
+func _box() -> AABB:
 	var box := AABB()
 	for volume in probes.volumes.volumes:
 		var size := Vector3(volume.size.x, volume.size.y, volume.size.z)
 		var own: AABB = volume.offset_from_lattice * AABB(Vector3(-0.5, -0.5, -0.5), size)
 		own.position += volume.centre
 		box = own if box.size == Vector3.ZERO else box.merge(own)
-	$Camera.look_at_from_position(box.get_center() + box.size.length() * Vector3(0.6, 0.5, 0.9), box.get_center())
+	return box

@@ -2,9 +2,11 @@ extends SceneTree
 ## Holds this export to the irradiance that RTGI's own lookup gives: prints a line for each case, exit code 0 if all pass.
 ##
 ## With --headless the lookup of volumes.gd on the imported textures; with a rendering driver also irradiance.gdshaderinc on the
-## GPU and, with Forward+ or Mobile, dynamic objects under LightmapGIData.
+## GPU and dynamic objects under LightmapGIData.
 
 const SIDE := 16  # pixels of a picture of a dynamic object
+## Where the probes are moved to for one of the cases.
+const MOVED := Transform3D(Vector3(0.36, 0.48, -0.8), Vector3(-0.8, 0.6, 0.0), Vector3(0.48, 0.64, 0.6), Vector3(-3.0, 5.0, 2.0))
 
 var _folder: String
 var _failed := false
@@ -26,22 +28,37 @@ func _initialize() -> void:
 			printerr("FAIL the volumes of %s cannot be read: run godot --headless --path . --import first" % sources[source])
 			quit(1)
 			return
-	for case: Dictionary in expected["cases"]:
-		_report(case["name"] + ", script", _script_irradiance(case, opened[case["volumes"]]), case["irradiance"], case["tolerance"], "W/m^2")
+	var cases := [[Transform3D.IDENTITY, ""], [MOVED, ", moved"]]
+	for place: Array in cases:
+		for case: Dictionary in expected["cases"]:
+			var volumes: RefCounted = opened[case["volumes"]]
+			volumes.world_from_local = place[0]
+			_report(case["name"] + ", script" + place[1], _script_irradiance(case, volumes), case, "irradiance")
 	if DisplayServer.get_name() == "headless":
 		print("SKIP the shader and dynamic objects: --headless has no rendering driver")
 	else:
-		for case: Dictionary in expected["cases"]:
-			var found: Array = await _shader_irradiance(case, opened[case["volumes"]], sources[case["volumes"]])
-			_report(case["name"] + ", shader", found, case["irradiance"], case["tolerance"], "W/m^2")
-		var dynamic: Dictionary = expected["dynamic objects"]
-		_report("dynamic objects", await _dynamic_radiance(dynamic), dynamic["radiance"], dynamic["tolerance"], "W/(sr m^2)")
+		for place: Array in cases:
+			for case: Dictionary in expected["cases"]:
+				var volumes: RefCounted = opened[case["volumes"]]
+				volumes.world_from_local = place[0]
+				_report(case["name"] + ", shader" + place[1], await _shader_irradiance(case, volumes, sources[case["volumes"]]),
+						case, "irradiance")
+			var dynamic: Dictionary = expected["dynamic objects"]
+			# Shifted but not turned: see probes.gd.
+			var shifted := Transform3D(Basis.IDENTITY, place[0].origin)
+			_report("dynamic objects" + place[1], await _dynamic_radiance(dynamic, shifted), dynamic, "radiance")
 	print("%s: %s" % ["FAIL" if _failed else "PASS", RenderingServer.get_video_adapter_name() if DisplayServer.get_name() != "headless"
 			else "headless"])
 	quit(1 if _failed else 0)
 
 
-func _report(name: String, found: Array, expected: Array, tolerance: Array, unit: String) -> void:
+func _report(name: String, found: Array, case: Dictionary, quantity: String) -> void:
+	var expected: Array = case[quantity]
+	var tolerance: Array = case["tolerance"]
+	var unit := "W/m^2" if quantity == "irradiance" else "W/(sr m^2)"
+	# The Compatibility renderer encodes what it draws in 3D for the screen, which coarsens halves.
+	var encoded := quantity == "radiance" and RenderingServer.get_current_rendering_method() == "gl_compatibility"
+	var slack := 2.0 if encoded else 1.0
 	var worst := 0.0
 	var share := 0.0
 	var brightest := 0.0
@@ -49,7 +66,7 @@ func _report(name: String, found: Array, expected: Array, tolerance: Array, unit
 		for channel in 3:
 			var error := absf(found[row][channel] - expected[row][channel]) if row < found.size() else INF
 			worst = maxf(worst, error if is_finite(error) else INF)
-			share = maxf(share, error / maxf(tolerance[row][channel], 1e-9) if is_finite(error) else INF)
+			share = maxf(share, error / maxf(slack * tolerance[row][channel], 1e-9) if is_finite(error) else INF)
 			brightest = maxf(brightest, expected[row][channel])
 	var passed := share <= 1.0 and not expected.is_empty()
 	_failed = _failed or not passed
@@ -60,7 +77,8 @@ func _report(name: String, found: Array, expected: Array, tolerance: Array, unit
 func _script_irradiance(case: Dictionary, volumes: RefCounted) -> Array:
 	var found := []
 	for row in case["points"].size():
-		found.append(volumes.irradiance(_vector(case["points"][row]), _vector(case["normals"][row])))
+		found.append(volumes.irradiance(volumes.world_from_local * _vector(case["points"][row]),
+				volumes.world_from_local.basis * _vector(case["normals"][row])))
 	return found
 
 
@@ -69,8 +87,8 @@ func _shader_irradiance(case: Dictionary, volumes: RefCounted, folder: String) -
 	var count: int = case["points"].size()
 	var table := Image.create_empty(count, 2, false, Image.FORMAT_RGBAF)
 	for row in count:
-		var point := _vector(case["points"][row])
-		var normal := _vector(case["normals"][row])
+		var point: Vector3 = volumes.world_from_local * _vector(case["points"][row])
+		var normal: Vector3 = volumes.world_from_local.basis * _vector(case["normals"][row])
 		table.set_pixel(row, 0, Color(point.x, point.y, point.z))
 		table.set_pixel(row, 1, Color(normal.x, normal.y, normal.z))
 	var shader := Shader.new()
@@ -104,7 +122,7 @@ void fragment() {
 
 
 ## What white squares show that stand at the points and face along the normals, lit by the kit's LightmapGIData alone.
-func _dynamic_radiance(case: Dictionary) -> Array:
+func _dynamic_radiance(case: Dictionary, place: Transform3D) -> Array:
 	var world := World3D.new()
 	world.environment = Environment.new()
 	world.environment.background_mode = Environment.BG_COLOR
@@ -115,13 +133,14 @@ func _dynamic_radiance(case: Dictionary) -> Array:
 	material.metallic_specular = 0.0
 	var viewports: Array[SubViewport] = []
 	for row in case["points"].size():
-		var point := _vector(case["points"][row])
-		var normal := _vector(case["normals"][row])
+		var point := place * _vector(case["points"][row])
+		var normal := place.basis * _vector(case["normals"][row])
 		var viewport := _viewport(Vector2i(SIDE, SIDE))
 		viewport.world_3d = world
 		if row == 0:
 			var light := LightmapGI.new()
 			light.light_data = load(_folder.path_join("kit/light_data.tres"))
+			light.transform = place
 			viewport.add_child(light)
 		var facing := Basis.looking_at(-normal, Vector3.UP if absf(normal.y) < 0.9 else Vector3.RIGHT)
 		var square := MeshInstance3D.new()
@@ -145,6 +164,8 @@ func _dynamic_radiance(case: Dictionary) -> Array:
 	var found := []
 	for image in images:
 		var colour := image.get_pixel(SIDE / 2, SIDE / 2)
+		if RenderingServer.get_current_rendering_method() == "gl_compatibility":
+			colour = colour.srgb_to_linear()  # this renderer encodes what it draws in 3D
 		found.append([colour.r, colour.g, colour.b])
 	return found
 

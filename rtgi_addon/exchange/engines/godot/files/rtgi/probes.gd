@@ -31,9 +31,18 @@ func _ready() -> void:
 
 func _notification(what: int) -> void:
 	if what == NOTIFICATION_TRANSFORM_CHANGED and is_node_ready():
+		update_configuration_warnings()
 		volumes.world_from_local = global_transform
 		for material in _shown:
 			volumes.apply_to(material)
+
+
+func _get_configuration_warnings() -> PackedStringArray:
+	# Basis::rotate_sh of Godot 4.6 counts the signs of odd harmonics as with Condon and Shortley, its shaders do not.
+	if is_inside_tree() and not global_transform.basis.orthonormalized().is_equal_approx(Basis.IDENTITY):
+		return ["Godot turns the light of a turned LightmapGI wrongly: dynamic objects get it from wrong sides. Move this node, but "
+				+ "do not turn it, where there are any."]
+	return []
 
 
 ## Looks for meshes and materials again: call it after materials were replaced.

@@ -209,11 +209,10 @@ static func _read_back(volume: Volume) -> void:
 				volume.moments.append(Vector2(moment.r, moment.g))
 
 
-## The slices of an imported texture. Without a rendering driver (--headless) Godot keeps none, so they come from the imported file.
+## The slices of an imported texture, from the imported file: without a rendering driver (--headless) Godot keeps none, and the
+## Compatibility renderer gives them back in 8 bits.
 static func slices_of(texture: Texture3D) -> Array[Image]:
-	var slices := texture.get_data()
-	if not slices.is_empty():
-		return slices
+	var slices: Array[Image] = []
 	var settings := ConfigFile.new()
 	settings.load(texture.resource_path + ".import")
 	var file := FileAccess.open(settings.get_value("remap", "path", ""), FileAccess.READ)
