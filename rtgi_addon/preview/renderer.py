@@ -93,6 +93,16 @@ class PreviewRenderer:
         if self._film is not None:
             self._film.samples = 0
 
+    def configure(self, settings: PreviewSettings, passes: tuple[str, ...]) -> None:
+        """Draw with other ``settings`` and keep other ``passes`` from now on; surfaces and indirect light stay as they are."""
+        validate_settings(settings)
+        if replace(settings, samples=self.settings.samples, mode=self.settings.mode) != self.settings:
+            self._lamps = DirectLight(settings)
+        if tuple(passes) != self._passes:
+            self._film = None
+        self.settings, self._passes = settings, tuple(passes)
+        self.reset()
+
     def update(self, scene: Scene) -> None:
         """Show ``scene`` from now on. What is the same object as before stays on the GPU; what has moved is sent."""
         before, self.scene = self.scene, scene

@@ -54,6 +54,12 @@ def test_indirect_light_alone_is_darker(seen):
     assert np.all(seen["indirect alone"].sum(axis=1) < seen["lamp moved"].sum(axis=1))
 
 
+def test_reflective_shadow_maps_need_no_bake_and_follow_objects(seen):
+    assert seen["maps without a bake"].min() > 0.01
+    # Off the left wall, which reflects where the block stood in its light.
+    assert np.abs(seen["block moved"] - seen["maps without a bake"]).max() > 0.02
+
+
 def test_f12_renders_beside_the_window(seen):
     left, middle, right = seen["F12"]
     assert left[RED] > 1.5 * left[GREEN] and right[GREEN] > right[RED] and middle.min() > 0.1

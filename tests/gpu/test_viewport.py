@@ -143,6 +143,20 @@ def test_techniques_that_need_no_bake_follow_objects(scene, technique):
     viewport.close()
 
 
+def test_what_is_shown_changes_without_reading_the_scene_again(scene):
+    from rtgi_addon.blender.engine.viewport import Viewport
+    viewport = Viewport()
+    drawn(viewport)
+    renderer = viewport.picture.renderer
+    for name, value in (("mode", "indirect"), ("shadow_resolution", 64), ("resolution_scale", 0.5), ("mode", "albedo")):
+        setattr(scene.rtgi_preview, name, value)
+        kept, _ = drawn(viewport)
+        assert viewport.picture.renderer is renderer
+        fresh, _ = drawn()
+        np.testing.assert_allclose(kept, fresh, atol=1e-5)
+    viewport.close()
+
+
 def test_leaks_are_shown_of_the_bake_that_has_them(scene):
     import bpy
     scene.rtgi_preview.leaks = True

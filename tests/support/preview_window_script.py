@@ -127,7 +127,22 @@ def story():
     yield 0.3
     yield from until(settled)
     looked_at("indirect alone")
+    # Software drivers take half a minute for a frame of it at full size.
+    window().scene.rtgi_preview.resolution_scale, window().scene.rtgi.technique = 0.1, "rsm"
+    yield 0.5
+    yield from until(settled)
+    looked_at("maps without a bake")
+    block = bpy.data.objects["Tall Block"]
+    before = block.location.x
+    block.location.x -= 0.5
+    yield 0.5
+    yield from until(settled)
+    looked_at("block moved")
+    block.location.x = before
+    window().scene.rtgi_preview.resolution_scale, window().scene.rtgi.technique = 1.0, "probes"
     window().scene.rtgi_preview.mode = "combined"
+    yield 0.5
+    yield from until(settled)
 
     scene = window().scene
     scene.render.resolution_x, scene.render.resolution_y = 64, 64

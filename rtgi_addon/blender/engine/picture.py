@@ -18,7 +18,7 @@ class Picture:
         """Show ``scene`` in the light of ``shown`` as ``settings`` (PreviewSettings) say, and average one sample of the CameraView
         ``seen`` in unless that would change nothing."""
         from ...preview.renderer import PreviewRenderer  # importable once there is a GPU
-        if self.renderer is None or settings != self._settings or shown.field is not self._field or shown.live != self._live:
+        if self.renderer is None or shown.field is not self._field or shown.live != self._live:
             self.close()
             baked = None if shown.baked is None else shown.baked.scene
             begun = scene
@@ -26,6 +26,9 @@ class Picture:
                 begun = replace(begun, lights=baked.lights, world=baked.world)
             self.renderer = PreviewRenderer(begun, shown.field, settings, (settings.mode,), baked, shown.live)
             self._settings, self._field, self._live, self._seen = settings, shown.field, shown.live, None
+        elif settings != self._settings:
+            self.renderer.configure(settings, (settings.mode,))
+            self._settings, self._seen = settings, None
         self.renderer.update(scene)
         if not seen.equals(self._seen) or size != self._size or self.unsettled:
             self.renderer.frame(seen, size)
