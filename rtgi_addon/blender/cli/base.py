@@ -25,12 +25,13 @@ class Report(Protocol):
 @dataclass(frozen=True)
 class Session:
     """What a door hands to a subcommand: ``progress`` to report to and be cancelled by, and ``read_scene`` which opens the
-    FILE (or takes the one that is open) and extracts it. Only ``read_scene`` touches Blender. ``has_file`` says whether there is
-    a FILE, for those that can do without."""
+    FILE (or takes the one that is open) and extracts it; ``open_file`` only opens it. Nothing else here touches Blender.
+    ``has_file`` says whether there is a FILE, for those that can do without."""
 
     progress: Progress
     read_scene: Callable[[], Scene]
     has_file: bool = True
+    open_file: Callable[[], None] = lambda: None
 
 
 @dataclass(frozen=True)

@@ -103,7 +103,7 @@ def _run(argv: list[str], prog: str, open_scene: Callable[[Namespace], None], ha
     try:
         with _interruptible(progress):
             named = getattr(arguments, "imported", None) is not None or has_file()
-            report = subcommand.run(arguments, Session(progress, read_scene, named))
+            report = subcommand.run(arguments, Session(progress, read_scene, named, lambda: open_scene(arguments)))
         console.close()
         streams.out.write((json.dumps(report.to_json(), indent=1) if arguments.json else report.to_text()) + "\n")
         streams.out.flush()
