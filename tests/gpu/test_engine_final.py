@@ -98,6 +98,31 @@ def test_the_geometry_is_that_of_the_scene(scene, tmp_path):
     assert middle == pytest.approx((point - eye.translation).length, rel=0.05)
 
 
+@pytest.mark.parametrize("technique", ["rsm", "lpv"])
+def test_techniques_that_need_no_bake_light_a_render_as_their_bake_does(scene, tmp_path, technique):
+    """And with an object elsewhere than when it was baked."""
+    import bpy
+    block = bpy.data.objects["Cube.001"]
+    scene.rtgi.technique = technique
+    scene.rtgi.technique_rsm.resolution, scene.rtgi.technique_lpv.steps = 128, 32
+    scene.rtgi_preview.render_samples = 8
+
+    def indirect():
+        # The few samples of a pixel are another choice in every bake: their means over blocks are not.
+        return render(scene, tmp_path)["Indirect"].reshape(HEIGHT // 8, 8, WIDTH // 8, 8, 3).mean(axis=(1, 3))
+
+    live = indirect()
+    block.location.x -= 0.8
+    moved = indirect()
+    bpy.ops.rtgi.bake()
+    baked = indirect()
+    block.location.x += 0.8
+    back = indirect()
+    assert live.min() > 0.01 and np.abs(moved - live).max() > 0.2 * live.mean()
+    np.testing.assert_allclose(moved, baked, atol=0.05 * baked.mean())
+    np.testing.assert_allclose(live, back, atol=0.05 * back.mean())
+
+
 @pytest.mark.parametrize("crop", [True, False])
 def test_a_border_holds_what_the_whole_picture_holds_there(scene, tmp_path, crop):
     whole = render(scene, tmp_path, "whole")
