@@ -3,33 +3,62 @@
 import argparse
 
 from ... import techniques
+from ...errors import BakeError, UsageError
 from ...exchange.bundle import check_target
 from ...jobs.bake import bake_scene, require_device
+from ...jobs.plan import PlannedBake, bake_planned
 from ...jobs.report import BakeSummary
+from ..motion import find_motion
 from .base import EXTRACT_SHARE, Session, Subcommand
-from .options import add_technique, check_technique, overrides
+from .options import PLANNED, add_technique, check_technique, overrides
+from .plan import add_target, target_of
 
 
 def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", required=True, metavar="DIR", help="the bundle to write; an earlier one is replaced at the end")
-    add_technique(parser)
+    add_technique(parser, planned=True)
     parser.add_argument("--resume", action="store_true", help="continue an interrupted bake to the same --out")
     parser.add_argument("--checkpoint-seconds", type=_seconds, default=10.0, metavar="T",
                         help="how often an unfinished bake is saved (default 10)")
     parser.add_argument("--device", choices=("cpu", "gpu"), default="cpu",
                         help="where the inner loops of a technique run that knows both (default cpu)")
     parser.add_argument("--picture", metavar="FILE.png", help="then draw the probes as spheres in the scene they light")
+    planned = parser.add_argument_group(f"with --technique {PLANNED}")
+    add_target(planned)
+    planned.add_argument("--no-check", action="store_true", help="do not measure how good the plan was after the bake")
 
 
-def _run(arguments: argparse.Namespace, session: Session) -> BakeSummary:
+def _check(arguments: argparse.Namespace) -> None:
+    if arguments.technique != PLANNED:
+        check_technique(arguments)
+        if arguments.memory is not None or arguments.keep_air or arguments.no_check:
+            raise UsageError("--memory, --keep-air and --no-check are for a plan", f"add --technique {PLANNED}")
+        return
+    chosen = [name for name in ("rays", "bounces") if getattr(arguments, name) is not None]
+    chosen += [name for name, _ in arguments.assignments]
+    if chosen:
+        raise UsageError(f"--technique {PLANNED} chooses {chosen[0]} itself", "leave it out, or name a technique")
+    target_of(arguments)
+
+
+def _run(arguments: argparse.Namespace, session: Session) -> BakeSummary | PlannedBake:
     # Everything that can fail without the file fails before it is read.
-    require_device(techniques.get(arguments.technique), arguments.device)
+    if arguments.technique != PLANNED:
+        require_device(techniques.get(arguments.technique), arguments.device)
+    elif arguments.device != "cpu":
+        raise BakeError("a planned bake runs on the CPU", "leave out --device, or name a technique")
     check_target(arguments.out)
     if arguments.device == "gpu":
         from ..gpu_context import open_context
         open_context()
     session.progress.stage("extract")
     scene = session.read_scene()
+    if arguments.technique == PLANNED:
+        return bake_planned(
+            scene, target_of(arguments), arguments.out, seed=arguments.seed, threads=arguments.threads, volume=arguments.volume,
+            motion=find_motion(), check=not arguments.no_check, direct=bool(arguments.direct), resume=arguments.resume,
+            checkpoint_seconds=arguments.checkpoint_seconds, picture=arguments.picture,
+            progress=session.progress.span(EXTRACT_SHARE, 1.0))
     return bake_scene(
         scene, arguments.technique, overrides(arguments), arguments.out, seed=arguments.seed, threads=arguments.threads,
         progress=session.progress.span(EXTRACT_SHARE, 1.0), resume=arguments.resume, volume=arguments.volume,
@@ -43,4 +72,4 @@ def _seconds(text: str) -> float:
     return value
 
 
-SUBCOMMAND = Subcommand("bake", "bake every Light Probe Volume into a bundle", True, _add_arguments, _run, check_technique)
+SUBCOMMAND = Subcommand("bake", "bake every Light Probe Volume into a bundle", True, _add_arguments, _run, _check)

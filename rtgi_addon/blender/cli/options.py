@@ -3,15 +3,21 @@
 import argparse
 
 from ... import techniques
+from ...evaluate.plan import Target
 from ...jobs.settings import build_settings
 
+# The technique that stands for whatever a plan chooses.
+PLANNED = "auto"
 # Options that stand for a setting of the technique, under the setting's own name.
 _SETTING_OPTIONS = ("order", "rays", "error", "bounces", "direct")
 
 
-def add_technique(parser: argparse.ArgumentParser) -> None:
-    """`--technique` and every option that sets it up, with `--seed`, `--threads` and `--volume`."""
-    parser.add_argument("--technique", default="probes", metavar="NAME", help=f"one of {', '.join(techniques.names())}")
+def add_technique(parser: argparse.ArgumentParser, planned: bool = False) -> None:
+    """`--technique` and every option that sets it up, with `--seed`, `--threads` and `--volume`; ``planned`` allows PLANNED too."""
+    names = ", ".join(techniques.names()) + (f", or {PLANNED}: the cheapest bake whose error at surfaces is within --error "
+                                             f"(default {Target.error:g})" if planned else "")
+    parser.add_argument("--technique", default="probes", metavar="NAME", help=f"one of {names}")
+    parser.add_argument("--preset", choices=techniques.PRESETS, help="how exact, and how dear; other options go before it")
     parser.add_argument("--volume", action="append", metavar="NAME", help="bake only this volume; may be repeated")
     parser.add_argument("--order", type=int, metavar="L", help="order of the spherical harmonics")
     effort = parser.add_mutually_exclusive_group()
@@ -28,7 +34,9 @@ def add_technique(parser: argparse.ArgumentParser) -> None:
 def overrides(arguments: argparse.Namespace) -> dict:
     """The settings that the command line names, by name."""
     given = {name: getattr(arguments, name) for name in _SETTING_OPTIONS if getattr(arguments, name) is not None}
-    return {**dict(arguments.assignments), **given}
+    method = techniques.registry().get(arguments.technique)
+    preset = {} if method is None else method.presets.get(arguments.preset, {})
+    return {**preset, **dict(arguments.assignments), **given}
 
 
 def check_technique(arguments: argparse.Namespace) -> None:

@@ -3,10 +3,10 @@
 import argparse
 
 from ...errors import UsageError
-from . import bake, chart, export, info, render, stability
+from . import bake, chart, export, info, plan, render, stability
 
-SUBCOMMANDS = {entry.name: entry for entry in (bake.SUBCOMMAND, render.SUBCOMMAND, chart.SUBCOMMAND, stability.SUBCOMMAND,
-                                           export.SUBCOMMAND, info.SUBCOMMAND)}
+SUBCOMMANDS = {entry.name: entry for entry in (bake.SUBCOMMAND, plan.SUBCOMMAND, render.SUBCOMMAND, chart.SUBCOMMAND,
+                                           stability.SUBCOMMAND, export.SUBCOMMAND, info.SUBCOMMAND)}
 
 
 class _Parser(argparse.ArgumentParser):

@@ -95,7 +95,9 @@ class Gathered:
 
 
 class Gatherer:
-    """Traces and shades items against one context and one surface cache."""
+    """Traces and shades items against one context and one surface cache. ``pdf`` is the density [1/sr] of its directions."""
+
+    pdf = _UNIFORM_PDF
 
     def __init__(self, context: LightContext, cache: SurfaceCache, placement, settings, seed: int):
         self._context, self._cache, self._placement, self._seed = context, cache, placement, seed
@@ -199,7 +201,7 @@ class Gatherer:
         """Density (n,) [m⁻²] of probe rays on the surfaces that the given hits met."""
         directions = traced.directions[traced.rows[rows] // item.shape[2]]
         cosine = np.abs(dot(self._context.geometry.normals_world[traced.surface.primitive[rows]], directions))
-        return _UNIFORM_PDF * cosine / np.maximum(traced.t[rows] ** 2, np.float32(1e-20))
+        return self.pdf * cosine / np.maximum(traced.t[rows] ** 2, np.float32(1e-20))
 
     def _direct(self, item: Item, traced: Traced, texel: np.ndarray) -> np.ndarray:
         """Irradiance (h, 3) of lamps and bright sky at hits, less what is sampled as a bright surface: the texel's mean where that
@@ -256,7 +258,7 @@ class Gatherer:
             numbers = self._light_numbers(item, 1, 5) + _fraction(hash_u32(item.probes, self._seed, 5))[:, None]
             numbers = (numbers - np.floor(numbers)).reshape(-1)
             origins = self._origins(item, item.shape[1] // RAYS_PER_LIGHT_SAMPLE)
-            total += self._connected(item, *surfaces.connect(numbers, origins, 1 / RAYS_PER_LIGHT_SAMPLE, _UNIFORM_PDF))
+            total += self._connected(item, *surfaces.connect(numbers, origins, 1 / RAYS_PER_LIGHT_SAMPLE, self.pdf))
         return total
 
     def bright_sky(self, item: Item) -> np.ndarray:
@@ -302,7 +304,7 @@ class Gatherer:
         directions = towards / distance[:, None]
         free = ~self._context.tracer.occluded(origins, directions, distance * np.float32(1 - 1e-4))
         transfer = np.abs(dot(normal, directions)) / squared
-        share = transfer / np.maximum(pdf_area / RAYS_PER_LIGHT_SAMPLE + _UNIFORM_PDF * transfer, np.float32(1e-30))
+        share = transfer / np.maximum(pdf_area / RAYS_PER_LIGHT_SAMPLE + self.pdf * transfer, np.float32(1e-30))
         return directions, np.where(free[:, None], emission * share[:, None], np.float32(0))
 
     def _visibility(self, item: Item, traced: Traced) -> tuple[np.ndarray, np.ndarray]:

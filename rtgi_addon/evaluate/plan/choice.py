@@ -1,0 +1,200 @@
+"""A plan: what to bake a scene with, why, and what else there would have been."""
+
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+import numpy as np
+
+from ... import techniques
+from ...errors import BakeError, UsageError
+from ...progress import Progress
+from ...scene import ProbeVolume, Scene
+from ...techniques.probes.settings import ProbeSettings
+from ...transport.context import LightContext
+from ...transport.ray_counter import count_rays
+from ..metrics import Figure
+from .alternatives import LOOSE, Measured, measure_others
+from .look import Look, Motion, look_at
+from .pilot import Pilot, Reading
+from .price import Price, Prices
+from .reasons import reasons
+from .sample import Sample, draw_sample
+from .search import Found, Search, upper
+from .unseen import wanted_probes
+
+# Surface points that a plan is made on, each under several normals.
+POINTS = 768
+# Probes are only left out where that saves more than this share.
+WORTH_LEAVING_OUT = 0.05
+# A lattice of more probes than this is not proposed unless asked for: an irradiance volume of 5 MB at order 2 and half precision.
+MOST_PROBES = 1 << 16
+
+
+@dataclass(frozen=True)
+class Target:
+    """What a plan has to meet: relative RMSE ``error`` of irradiance at receivers, with the probes of the bundle as this add-on
+    reads them; ``memory`` bytes that the bake may take (None: any); ``probes`` that the lattices may have together. ``orders`` are
+    the SH orders to choose from; ``keep_air`` keeps probes that no surface reads, for things that move through the air."""
+
+    error: float = 0.05
+    memory: float | None = None
+    probes: int = MOST_PROBES
+    orders: tuple[int, ...] = (1, 2)
+    keep_air: bool = False
+
+    def __post_init__(self):
+        if not 0.001 <= self.error <= 1.0:
+            raise UsageError(f"error is {self.error:g}", "give a value from 0.001 to 1")
+        if self.probes < 1 or (self.memory is not None and self.memory <= 0):
+            raise UsageError("a plan needs some probes and some memory", "give numbers above 0")
+
+
+@dataclass(frozen=True)
+class Option:
+    """One way to bake: ``label`` says how it differs; ``error`` at receivers is predicted (standard error over surface points);
+    ``meets`` tells whether it meets the target with search.CONFIDENCE; ``why_not`` why it is no option at all."""
+
+    technique: str
+    label: str
+    resolutions: tuple[tuple[int, int, int], ...]
+    error: Figure
+    price: Price
+    meets: bool
+    why_not: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """``technique`` with ``settings`` (overrides of its defaults) on ``volumes``, which replace the scene's of the same name.
+
+    ``chosen`` is the first of ``options``, ``met`` whether it meets the ``target``; ``reasons`` say why, in sentences; ``kept`` of
+    ``probes`` lattice points get rays. ``seconds`` and ``rays`` are what the plan itself took, ``rate`` the measured exponent of
+    convergence.
+    """
+
+    target: Target
+    technique: str
+    settings: dict
+    volumes: tuple[ProbeVolume, ...]
+    met: bool
+    options: tuple[Option, ...]
+    reasons: tuple[str, ...]
+    look: Look
+    found: Found
+    sample: Sample
+    probes: int
+    kept: int
+    rate: float | None
+    seconds: float
+    rays: int
+    seed: int
+
+    @property
+    def chosen(self) -> Option:
+        """What is planned."""
+        return self.options[0]
+
+    def applied(self, scene: Scene) -> Scene:
+        """``scene`` with the planned lattices, and notes that say so. Volumes that were not planned are left as they are."""
+        planned = {volume.name: volume for volume in self.volumes}
+        notes = tuple(f"planned: {line}" for line in self.reasons)
+        return replace(scene, volumes=tuple(planned.get(volume.name, volume) for volume in scene.volumes),
+                       notes=(*scene.notes, *notes))
+
+
+def make_plan(scene: Scene, target: Target, *, seed: int = 0, threads: int | None = None, motion: Motion | None = None,
+              others: bool = True, points: int = POINTS, progress: Progress | None = None) -> Plan:
+    """The cheapest bake of ``scene`` that meets ``target``, or the best that can be had.
+
+    ``others`` also measures the other techniques, which otherwise are only where the target is loose. Cheap is what takes few
+    rays, so the same arguments give the same plan on any machine, but for its seconds. Raises BakeError, Cancelled.
+    """
+    progress = progress or Progress()
+    started = perf_counter()
+    if not scene.volumes:
+        raise BakeError("the scene has no probe volume", "add a Light Probe Volume")
+    with count_rays() as counter:
+        progress.step(0.0, "looking at the scene")
+        scene = replace(scene, volumes=tuple(replace(volume, settings={}, wanted=None) for volume in scene.volumes))
+        context = LightContext(scene, threads)
+        sample = draw_sample(context, scene.volumes, points, seed)
+        look = look_at(context, scene.volumes, sample, motion or Motion())
+        pilot = Pilot(context, scene.volumes, sample, tuple(sorted(target.orders)), target.error, seed,
+                      progress.span(0.05, 0.3))
+        prices = Prices(pilot)
+        found = Search(pilot, prices, target.error, lambda resolutions, order: _limit(pilot, prices, target, resolutions, order),
+                       progress.span(0.3, 0.8 if others else 0.95)).run()
+        names = [name for name in techniques.names() if name != "probes"] if others or target.error > LOOSE else []
+        measured = measure_others(pilot, names, seed, progress.span(0.8, 0.95))
+        volumes = _volumes(context, found.reading, sample, scene.volumes, target.keep_air or bool(look.motion.objects))
+    kept = sum(int(np.prod(volume.resolution)) if volume.wanted is None else int(volume.wanted.sum()) for volume in volumes)
+    options = _options(pilot, prices, found, measured, target, kept)
+    chosen = options[0]
+    settings = {"order": found.order, "error": found.ray_error} if chosen.technique == "probes" else {"order": found.order}
+    progress.step(1.0, "planned")
+    return Plan(target, chosen.technique, settings, volumes, chosen.meets, options,
+                tuple(reasons(look, found, chosen, scene.volumes, volumes, target, kept)), look, found, sample,
+                found.reading.lattice_points, kept, found.rate, perf_counter() - started, counter.rays, seed)
+
+
+def _limit(pilot: Pilot, prices: Prices, target: Target, resolutions, order: int) -> str:
+    """The name of what lattices of ``resolutions`` pass, or ""."""
+    probes = sum(int(np.prod(resolution)) for resolution in resolutions)
+    if probes > max(target.probes, min_probes(resolutions)):
+        return "number of probes"
+    volumes = tuple(replace(volume, resolution=resolution) for volume, resolution in zip(pilot.volumes, resolutions, strict=True))
+    if target.memory is not None and prices.bytes(volumes, order, probes * 2.0 * ProbeSettings().max_rays ** 0.5) > target.memory:
+        return "memory"
+    return ""
+
+
+def min_probes(resolutions) -> int:
+    """Probes of lattices that have no more than two along any axis."""
+    return sum(int(np.prod(np.minimum(resolution, 2))) for resolution in resolutions)
+
+
+def _volumes(context: LightContext, reading: Reading, sample: Sample, files: tuple[ProbeVolume, ...],
+             keep_air: bool) -> tuple[ProbeVolume, ...]:
+    """The planned volumes, told which of their probes are worth rays."""
+    if keep_air:
+        return reading.volumes
+    planned = []
+    for volume, file in zip(reading.volumes, files, strict=True):
+        wanted = wanted_probes(context.geometry, volume, sample.lift, 1.0 / np.asarray(file.resolution), sample.within < 1.0)
+        few = wanted.any() and wanted.mean() < 1.0 - WORTH_LEAVING_OUT
+        planned.append(replace(volume, wanted=wanted if few else None))
+    return tuple(planned)
+
+
+def _options(pilot: Pilot, prices: Prices, found: Found, measured: list[Measured], target: Target, kept: int) -> tuple[Option, ...]:
+    """What is planned first, then what else there is."""
+    def probes(reading, order, ray_error, label, share=None):
+        error = reading.error(order, ray_error)
+        return Option("probes", label, reading.resolutions, error, prices.price(reading, order, ray_error, share),
+                      upper(error) <= target.error)
+
+    chosen = probes(found.reading, found.order, found.ray_error, "planned", kept)
+    rest, own = [], found.reading
+    for order in pilot.orders:
+        if order != found.order:
+            rest.append(probes(own, order, found.ray_error, f"order {order}", kept))
+    if found.ray_error > 0.01:
+        rest.append(probes(own, found.order, 0.01, "rays to 1 %", kept))
+    climb = [reading for reading in found.climb if reading is not own]
+    coarser = [reading for reading in climb if reading.lattice_points < own.lattice_points]
+    finer = [reading for reading in climb if reading.lattice_points > own.lattice_points]
+    rest += [probes(reading, found.order, found.ray_error, "coarser") for reading in coarser[-1:]]
+    rest += [probes(reading, found.order, found.ray_error, "finer") for reading in finer[:1]]
+    lattice = found.reading.error(found.order).value
+    for other in measured:
+        error = Figure(float(np.hypot(other.error.value, lattice)), other.error.standard_error)
+        rays, seconds = other.rays + kept * other.rays_per_probe, other.seconds + kept * other.seconds_per_probe
+        price = Price(rays, seconds, prices.bytes(own.volumes, found.order, 0.0))
+        option = Option(other.technique, "defaults", own.resolutions, error, price,
+                        not other.why_not and upper(error) <= target.error, other.why_not)
+        if option.meets and price.rays < chosen.price.rays:
+            rest.insert(0, chosen)
+            chosen = replace(option, label="planned")
+        else:
+            rest.append(option)
+    return chosen, *rest

@@ -1,0 +1,82 @@
+"""What a bake of probes will cost: rays, wall-clock seconds and memory, from what the pilot took."""
+
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+import numpy as np
+
+from ...scene import ProbeVolume
+from ...scene.memory import estimate_bytes
+from ...techniques.probes.bake import TEXELS, cache_rays, texel_size
+from ...techniques.probes.placement import PILOT_RAYS
+from ...techniques.probes.settings import ProbeSettings
+from ...transport.context import LightContext
+from .pilot import PILOT_ERROR, Pilot, Reading
+
+# A bake's hits are kept for relighting, up to so many rays.
+BYTES_PER_RAY, MOST_KEPT_RAYS = 16, 1 << 25
+# What any bake takes beside what it holds: code, tables, a batch of rays.
+BASE_BYTES = 16 << 20
+
+
+@dataclass(frozen=True)
+class Price:
+    """``rays`` of all kinds, ``seconds`` of wall clock on this machine as it is now, ``bytes`` of memory at the peak."""
+
+    rays: float
+    seconds: float
+    bytes: float
+
+
+class Prices:
+    """Prices of bakes of the scene of ``pilot``."""
+
+    def __init__(self, pilot: Pilot):
+        self._pilot = pilot
+        started = perf_counter()
+        LightContext(pilot.context.scene, pilot.context.threads)
+        self._scene_seconds = perf_counter() - started
+
+    def rays(self, reading: Reading, error: float, kept: float | None = None) -> float:
+        """Rays of a bake of the lattices of ``reading`` with the target ``error``, ``kept`` probes of them (None: all)."""
+        return self._cache_rays(reading.volumes, error) + self._probe_rays(reading, error, kept)
+
+    def price(self, reading: Reading, order: int, error: float, kept: float | None = None) -> Price:
+        """The same with time and memory, for SH of ``order``."""
+        probe_rays = self._probe_rays(reading, error, kept)
+        seconds = self._scene_seconds + self._cache_rays(reading.volumes, error) * self._seconds_per_cache_ray \
+            + probe_rays * self._seconds_per_probe_ray
+        return Price(self.rays(reading, error, kept), seconds, self.bytes(reading.volumes, order, probe_rays))
+
+    def bytes(self, volumes: tuple[ProbeVolume, ...], order: int, rays: float) -> float:
+        """Peak memory of a bake of ``volumes`` that traces ``rays``."""
+        held = sum(estimate_bytes(replace(self._pilot.context.scene, volumes=volumes), order).values())
+        return BASE_BYTES + held + BYTES_PER_RAY * min(rays, MOST_KEPT_RAYS)
+
+    def _probe_rays(self, reading: Reading, error: float, kept: float | None) -> float:
+        probes = reading.lattice_points if kept is None else kept
+        return probes * (float(reading.rays(error).mean()) + 2.0 * PILOT_RAYS)
+
+    def _cache_rays(self, volumes: tuple[ProbeVolume, ...], error: float) -> float:
+        pilot = self._pilot
+        settings, pilots = ProbeSettings(error=error), ProbeSettings(error=PILOT_ERROR)
+        size = texel_size(pilot.context, volumes, _texels(error))
+        measured = max(pilot.truth_effort.rays - len(pilot.sample.receivers.points) * pilot.receiver_rays,
+                       pilot.cache.count * pilot.cache.rays)
+        return measured * cache_rays(settings) / cache_rays(pilots) * (pilot.cache.layout.size / size) ** 2
+
+    @property
+    def _seconds_per_cache_ray(self) -> float:
+        effort = self._pilot.truth_effort
+        return effort.seconds / max(effort.rays, 1)
+
+    @property
+    def _seconds_per_probe_ray(self) -> float:
+        efforts = [reading.effort for reading in self._pilot.readings]
+        largest = max(efforts, key=lambda effort: effort.rays)
+        return largest.seconds / max(largest.rays, 1)
+
+
+def _texels(error: float) -> float:
+    refine = error / 0.01
+    return TEXELS / min(refine, float(np.sqrt(refine)))
