@@ -4,7 +4,7 @@ PYTHON := $(RTGI_VENV)/bin/python
 PYTEST := $(PYTHON) -m pytest
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-fast lint bench charts
+.PHONY: help setup demo test test-fast lint extension bench charts
 
 help:                ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { sub(/ .*/, "", $$1); printf "make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -25,6 +25,9 @@ test-fast: setup     ## run the tests that take less than a few seconds each
 
 lint: setup          ## check style
 	$(PYTHON) -m ruff check .
+
+extension: setup     ## build the extension's zips, one per platform, into dist/ (downloads their wheels from PyPI once)
+	$(PYTHON) tools/build_extension.py
 
 charts: setup        ## chart speed against accuracy of every sample into benchmarks/results/charts (some minutes each)
 	$(PYTHON) benchmarks/charts.py

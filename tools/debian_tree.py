@@ -35,7 +35,7 @@ Acquire::Check-Valid-Until "false";
 DPkg::Options {"--force-unsafe-io";};
 """
 # numpy is Debian's own (the one its Blender was built for), so wheels are installed without what they depend on.
-WHEELS = ("embreex", "OpenEXR", "pytest", "iniconfig", "pluggy", "packaging", "pygments")
+WHEELS = ("embreex", "pytest", "iniconfig", "pluggy", "packaging", "pygments")
 WHEEL_PLATFORMS = ("manylinux_2_17_x86_64", "manylinux2014_x86_64", "manylinux_2_28_x86_64", "manylinux_2_34_x86_64")
 
 
@@ -96,8 +96,12 @@ def install_wheels(tree: Path, wheels: list[str]) -> None:
                    "--python-version", version, *platforms, *missing])
 
 
-def command_in(tree: Path, command: list[str], binds: tuple[Path, ...] = (), environment: dict | None = None) -> list[str]:
-    """The command line that runs ``command`` in ``tree``: a private mount namespace, then chroot."""
+def command_in(tree: Path, command: list[str], binds: tuple[Path, ...] = (), environment: dict | None = None,
+               network: bool = True) -> list[str]:
+    """The command line that runs ``command`` in ``tree``: a private mount namespace, then chroot.
+
+    Without ``network`` it also has a network namespace of its own, in which there is no interface that is up.
+    """
     mounts = []
     for source in (Path("/proc"), Path("/sys"), Path("/dev"), *binds):
         inside = tree / source.relative_to("/")
@@ -111,7 +115,7 @@ def command_in(tree: Path, command: list[str], binds: tuple[Path, ...] = (), env
     assignments = " ".join(f"{name}={shlex.quote(value)}" for name, value in settings.items())
     inner = f"cd {shlex.quote(str(directory))} && exec {shlex.join(command)}"
     script = " && ".join([*mounts, f"exec env {assignments} chroot {shlex.quote(str(tree))} /bin/sh -c {shlex.quote(inner)}"])
-    return ["unshare", "--mount", "/bin/sh", "-c", script]
+    return ["unshare", "--mount", *([] if network else ["--net"]), "/bin/sh", "-c", script]
 
 
 def check_run(command: list[str]) -> None:
@@ -139,6 +143,7 @@ def main() -> None:
     running.add_argument("tree", type=Path)
     running.add_argument("--bind", type=Path, action="append", default=[], help="one more path that the command may see")
     running.add_argument("--env", action="append", default=[], metavar="NAME=VALUE", help="a variable for the command")
+    running.add_argument("--no-network", action="store_true", help="the command finds no network, not even this machine's own")
     given, line = split_at(sys.argv[1:], "--")
     arguments = parser.parse_args(given)
     if os.geteuid() != 0:
@@ -153,7 +158,7 @@ def main() -> None:
         sys.exit(f"{tree} is no Debian tree: make it with `{Path(sys.argv[0]).name} create {tree}`")
     binds = (REPOSITORY, *(path.resolve() for path in arguments.bind))
     environment = dict(item.split("=", 1) for item in arguments.env)
-    sys.exit(subprocess.run(command_in(tree, line, binds, environment), check=False).returncode)
+    sys.exit(subprocess.run(command_in(tree, line, binds, environment, not arguments.no_network), check=False).returncode)
 
 
 if __name__ == "__main__":

@@ -137,6 +137,15 @@ print("CLEAN", hasattr(bpy.types.Scene, "rtgi"))
     assert any("no Embree" in note and "times slower" in note for note in manifest["notes"])
 
 
+def test_without_embree_the_shell_still_bakes(tmp_path):
+    ran = run_without("embreex,OpenEXR", """
+from rtgi_addon.blender.cli import main_module
+sys.exit(main_module([sys.argv[4], "bake", "--out", sys.argv[3], "--rays", "8"]))
+""", tmp_path / "bake", REPOSITORY / "sample_blends/furnace.blend")
+    assert ran.returncode == 0, ran.stderr
+    assert "no Embree" in ran.stdout and "5 times slower" in ran.stdout
+
+
 def test_without_numpy_the_add_on_says_what_to_install():
     ran = run_without("numpy", "rtgi_addon.register()")
     assert "RTGI needs numpy" in ran.stderr.splitlines()[-1] and "restart Blender" in ran.stderr

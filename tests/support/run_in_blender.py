@@ -2,7 +2,7 @@
 
     blender -b --factory-startup --gpu-backend vulkan --python tests/support/run_in_blender.py -- tests/gpu
 
-Needs pytest, embreex and OpenEXR in Blender's Python, as in the tree that tools/debian_tree.py makes.
+Needs pytest and embreex in Blender's Python, as in the tree that tools/debian_tree.py makes.
 """
 
 import os

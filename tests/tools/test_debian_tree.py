@@ -38,6 +38,8 @@ def test_a_command_sees_its_folders_and_nothing_of_it_stays_mounted(tool, tmp_pa
     script = line[-1]
     assert f"mount --rbind '{shared}' '/tree{shared}'" in script
     assert "NAME='a b'" in script and "chroot /tree" in script
+    offline = tool.command_in(Path("/tree"), ["true"], network=False)
+    assert "--net" in offline and "--net" not in line
     assert "two words" in script and f"cd '\"'\"'{shared}'\"'\"'" in script
 
 
