@@ -140,7 +140,7 @@ print("CLEAN", hasattr(bpy.types.Scene, "rtgi"))
 def test_without_embree_the_shell_still_bakes(tmp_path):
     ran = run_without("embreex,OpenEXR", """
 from rtgi_addon.blender.cli import main_module
-sys.exit(main_module([sys.argv[4], "bake", "--out", sys.argv[3], "--rays", "8"]))
+sys.exit(main_module([sys.argv[4], "bake", "--out", sys.argv[3], "--rays", "16"]))
 """, tmp_path / "bake", REPOSITORY / "sample_blends/furnace.blend")
     assert ran.returncode == 0, ran.stderr
     assert "no Embree" in ran.stdout and "5 times slower" in ran.stdout
