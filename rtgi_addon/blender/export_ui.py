@@ -48,8 +48,8 @@ class RTGI_export_settings(bpy.types.PropertyGroup):
     engine: bpy.props.EnumProperty(name="Engine", description="For which engine the probes are written", items=_ENGINES)
     folder: bpy.props.StringProperty(name="Folder", description="Where the export goes; an earlier export there is replaced",
                                      subtype="DIR_PATH", default="//rtgi_export/", options={"PATH_SUPPORTS_BLEND_RELATIVE"})
-    model: bpy.props.BoolProperty(name="Model", description="Write what renders of this scene as glTF into the sample scene, lit by "
-                                                            "the probes", default=True)
+    model: bpy.props.BoolProperty(
+        name="Model", description="Write what renders of this scene as glTF into the sample scene, lit by the probes", default=True)
 
 
 class RTGI_OT_export(ModalJob, bpy.types.Operator):

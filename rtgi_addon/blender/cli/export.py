@@ -14,8 +14,8 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("bundle", metavar="BUNDLE", help="the folder that `bake --out` wrote")
     parser.add_argument("--engine", required=True, metavar="NAME", help=f"one of {', '.join(engines.names())}")
     parser.add_argument("--out", required=True, metavar="DIR", help="the folder to write; an earlier export is replaced at the end")
-    parser.add_argument("--model", metavar="FILE.glb", help="the scene as glTF Binary, shown by the sample scene; default: the FILE, "
-                                                            "if there is one, written by Blender's own exporter")
+    parser.add_argument("--model", metavar="FILE.glb", help="the scene as glTF Binary, shown by the sample scene; default: the "
+                                                            "FILE, if there is one, written by Blender's own exporter")
     parser.add_argument("--no-conformance", action="store_true", help="leave out the kit that holds the engine to our numbers")
 
 

@@ -97,10 +97,12 @@ def _magnitude(field: ProbeField, points: np.ndarray, normals: np.ndarray) -> np
 
 def _known_grid() -> ProbeGrid:
     """16 probes: a constant, six lobes (±x, ±y, ±z), and each coefficient by itself on top of a constant."""
-    directions, solid_angles = sh.quadrature(2 * ORDER + 8)
+    directions, solid_angles = sh.quadrature(64)
     constant = sh.project(directions, np.ones((len(directions), 1)), solid_angles, ORDER) * _TINT
-    lobes = [sh.project(directions, np.maximum(directions @ axis, 0.0)[:, None] ** 2, solid_angles, ORDER) * np.roll(_TINT, turn)
-             for turn, axis in enumerate(np.concatenate([np.eye(3), -np.eye(3)]))]
+    # On a floor, without which the lobes would ring and deringing would change what is known.
+    shapes = np.maximum(directions @ np.concatenate([np.eye(3), -np.eye(3)]).T, 0.0) ** 2 + 0.1
+    lobes = [sh.project(directions, shape[:, None], solid_angles, ORDER) * np.roll(_TINT, turn)
+             for turn, shape in enumerate(shapes.T)]
     single = [constant + 0.4 * np.eye(_COUNT)[:, [index]] * np.array([1.0, -0.75, 0.5]) for index in range(_COUNT)]
     values = np.stack([constant, *lobes, *single]).astype(np.float32)
     volume = ProbeVolume("Known", _box((0.0, 0.0, 0.0), (2.0, 1.0, 1.0), np.eye(3)), (4, 2, 2))

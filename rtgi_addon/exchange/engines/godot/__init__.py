@@ -21,10 +21,11 @@ from .textures import DISTANCES, PROBES, write_textures
 # The folder that a project needs, the kit, and what each holds besides the volumes.
 ADDON, KIT = "rtgi", "conformance"
 _FILES = Path(__file__).parent / "files"
-_SHADER_FILES = ("surface.gdshaderinc", "surface.gdshader", "surface_double_sided.gdshader", "volumes.gd", "probes.gd", "probes.tscn")
-_SAMPLE_FILES = ("project.godot", "sample.gd", "sample.tscn")
-# Each volume takes two samplers; OpenGL promises 16 and Godot needs some of its own.
-MAX_VOLUMES = 5
+_ADDON_FILES = ("surface.gdshaderinc", "surface.gdshader", "surface_double_sided.gdshader", "volumes.gd", "probes.gd",
+                "probes.tscn")
+_SAMPLE_FILES = ("README.md", "project.godot", "sample.gd", "sample.tscn")
+# Each volume takes two samplers, and desktop drivers of the Compatibility renderer have 32, of which Godot needs some.
+MAX_VOLUMES = 8
 
 
 class Godot(Engine):
@@ -46,10 +47,9 @@ class Godot(Engine):
         volumes = export_volumes(field, self.axes)
         progress.step(0.4, "Writing textures")
         _write_volumes(folder / ADDON, volumes, field.includes_direct)
-        copy_files(_FILES / ADDON, folder / ADDON, _SHADER_FILES)
+        copy_files(_FILES / ADDON, folder / ADDON, _ADDON_FILES)
         progress.step(0.6, "Writing the sample scene")
         copy_files(_FILES, folder, _SAMPLE_FILES)
-        copy_files(_FILES, folder, ["README.md"])
         if settings.model is not None:
             shutil.copyfile(settings.model, folder / "model.glb")
         if settings.conformance:

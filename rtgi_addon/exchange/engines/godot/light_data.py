@@ -7,11 +7,12 @@ tree over the cells, then three comparisons. Points are lattice points, also whe
 the box, so that the volume reaches as far as ours. Of overlapping volumes the finest one wins: the tree asks for its box first.
 
 Read in Godot 4.6: `LightStorage::lightmap_tap_sh_light` (a node: plane normal and distance, node over, node under; a leaf is
--1 - tetrahedron; children come after their parents), `RendererSceneCull::_update_instance_lightmap_captures`, `scene_forward_*.glsl`.
+-1 - tetrahedron; children come after their parents), `RendererSceneCull::_update_instance_lightmap_captures`,
+`scene_forward_*.glsl`.
 """
 
 from dataclasses import dataclass
-from itertools import permutations
+from itertools import pairwise, permutations
 
 import numpy as np
 
@@ -75,7 +76,7 @@ def light_data(volumes: tuple[ExportVolume, ...]) -> LightData:
         own_points, own_sh, own_tetrahedra = _lattice(volume)
         box = _box_planes(volume) if number + 1 < len(volumes) else []
         gates = [tree.node(plane) for plane in box]
-        for gate, following in zip(gates, gates[1:], strict=False):
+        for gate, following in pairwise(gates):
             tree.children[gate][1] = following
         root = _cells_tree(tree, volume, first_tetrahedron)
         if gates:

@@ -1,8 +1,8 @@
 """Probe volumes as EXR flipbooks that Godot imports as Texture3D, with the import settings beside them.
 
-probes.exr is RGBA of half floats, eight blocks of nz slices: (way from lattice point to probe, 1 if it holds light); SH of radiance,
-red 0-3, red 4-7, green 0-3, green 4-7, blue 0-3, blue 4-7; (red 8, green 8, blue 8, 0). distances.exr is RG of float32: their
-variance is a difference of the two, for which halves are too coarse.
+probes.exr is RGBA of half floats, eight blocks of nz slices: (way from lattice point to probe, 1 if it holds light); SH of
+radiance, red 0-3, red 4-7, green 0-3, green 4-7, blue 0-3, blue 4-7; (red 8, green 8, blue 8, 0). distances.exr is RG of float32:
+their variance is a difference of the two, for which halves are too coarse.
 """
 
 from pathlib import Path
