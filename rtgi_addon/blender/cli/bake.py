@@ -8,7 +8,6 @@ from ...exchange.bundle import check_target
 from ...jobs.bake import bake_scene, require_device
 from ...jobs.plan import PlannedBake, bake_planned
 from ...jobs.report import BakeSummary
-from ..motion import find_motion
 from .base import EXTRACT_SHARE, Session, Subcommand
 from .options import PLANNED, add_technique, check_technique, overrides
 from .plan import add_target, target_of
@@ -42,6 +41,7 @@ def _check(arguments: argparse.Namespace) -> None:
 
 
 def _run(arguments: argparse.Namespace, session: Session) -> BakeSummary | PlannedBake:
+    from ..motion import find_motion  # needs Blender, which prints when it is loaded
     # Everything that can fail without the file fails before it is read.
     if arguments.technique != PLANNED:
         require_device(techniques.get(arguments.technique), arguments.device)

@@ -5,7 +5,6 @@ import argparse
 from ...evaluate.plan import Target
 from ...evaluate.plan.choice import MOST_PROBES
 from ...jobs.plan import PlanReport, plan_scene
-from ..motion import find_motion
 from .base import EXTRACT_SHARE, Session, Subcommand
 from .options import at_least
 
@@ -48,6 +47,7 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(arguments: argparse.Namespace, session: Session) -> PlanReport:
+    from ..motion import find_motion  # needs Blender, which prints when it is loaded
     session.progress.stage("extract")
     scene = session.read_scene()
     return plan_scene(scene, target_of(arguments), seed=arguments.seed, threads=arguments.threads, volume=arguments.volume,
