@@ -21,7 +21,7 @@ LEAVES = {"errors", "progress"}
 # Who may import what from outside; numpy and the standard library are everybody's.
 OWNERS = {
     "bpy": {"blender"}, "_cycles": {"blender"}, "bpy_extras": {"blender"}, "bmesh": {"blender"}, "addon_utils": {"blender"},
-    "bpy_types": {"blender"},
+    "bpy_types": {"blender"}, "bl_operators": {"blender"}, "bl_ui": {"blender"},
     "mathutils": {"blender", "transport"}, "gpu": {"preview"}, "gpu_extras": {"preview"}, "blf": {"preview"},
     "matplotlib": {"evaluate"}, "embreex": {"transport"},
 }

@@ -6,6 +6,8 @@ What was charted lives as long as this run of Blender, by scene name: its files 
 from pathlib import Path
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..errors import BakeError
 from ..evaluate.chart_data import Chart
@@ -15,7 +17,9 @@ from .bake_job import output_folder
 from .extract import extract_scene
 from .modal_job import GRACE, ModalJob
 from .panels import draw_lines
+from .progress_text import bar_text
 from .session import redraw, session
+from .translations import sentence
 from .worker import BakeWorker, duration
 
 # Rows of the table in the panel.
@@ -65,7 +69,7 @@ class RTGI_OT_chart(ModalJob, bpy.types.Operator):
     def poll(cls, context):
         """Not while another chart or a bake is running."""
         if charts.running or session.running:
-            cls.poll_message_set("A chart or a bake is already running")
+            cls.poll_message_set(rpt_("A chart or a bake is already running"))
             return False
         return context.mode == "OBJECT"
 
@@ -81,7 +85,7 @@ class RTGI_OT_chart(ModalJob, bpy.types.Operator):
                 from .cycles_receivers import CyclesReference
                 reference = CyclesReference(self.noise, scene=scene)
         except BakeError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, sentence(str(error)))
             return None
         folder, name = charts.folder, scene.name
         options = {"seeds": self.seeds, "points": self.points, "noise": self.noise, "reference": reference, "maps": self.maps}
@@ -99,19 +103,23 @@ class RTGI_OT_chart(ModalJob, bpy.types.Operator):
         charts.charting = ""
         redraw()
         if outcome.error:
-            self.report({"ERROR"}, outcome.error)
+            self.report({"ERROR"}, sentence(outcome.error))
             return {"CANCELLED"}
         if outcome.cancelled:
             kept = charts.charts.get(name)
-            self.report({"INFO"}, "Chart cancelled" + (f"; {len(kept[0].points)} settings are in {kept[1]}" if kept else ""))
-            if kept:
+            if not kept:
+                self.report({"INFO"}, rpt_("Chart cancelled"))
+            else:
+                self.report({"INFO"}, rpt_("Chart cancelled; {count} settings are in {folder}").format(
+                    count=len(kept[0].points), folder=kept[1]))
                 _load_image(kept[1] / "chart.png")
             return {"CANCELLED"}
         report = outcome.summary
         charts.charts[name] = report.chart, report.folder
         if report.picture is not None:
             _load_image(report.picture)
-        self.report({"INFO"}, report.hint or f"Charted {len(report.chart.points)} settings into {report.folder}")
+        self.report({"INFO"}, sentence(report.hint) or rpt_("Charted {count} settings into {folder}").format(
+            count=len(report.chart.points), folder=report.folder))
         return {"FINISHED"}
 
 
@@ -149,10 +157,8 @@ class RTGI_PT_chart(bpy.types.Panel):
         layout, width = self.layout, context.region.width
         if charts.running:
             report, stopping = charts.worker.report, charts.worker.progress.cancelled
-            left = "" if report.seconds_left is None else f"  ·  {duration(report.seconds_left)} left"
             row = layout.row(align=True)
-            row.progress(factor=report.fraction, type="BAR",
-                         text="Cancelling…" if stopping else f"{100 * report.fraction:.0f}%{left}")
+            row.progress(factor=report.fraction, type="BAR", text=bar_text(report, stopping), translate=False)
             row.operator("rtgi.cancel_chart", text="", icon="CANCEL")
         else:
             layout.operator("rtgi.chart", icon="GRAPH")
@@ -161,7 +167,7 @@ class RTGI_PT_chart(bpy.types.Panel):
             return
         chart, folder = known
         if not chart.complete and not charts.running:
-            draw_lines(layout, "Cancelled before the end", width, "INFO")
+            draw_lines(layout, iface_("Cancelled before the end"), width, "INFO")
         _draw_ranking(layout, chart)
         draw_lines(layout, folder.name, width, "FILE_FOLDER")
 
@@ -180,12 +186,12 @@ def ranking(chart: Chart) -> list[tuple[bool, str, str, str]]:
 
 def _draw_ranking(layout, chart: Chart) -> None:
     column = layout.column(align=True)
-    for on_front, name, error, time in [(False, "Setting", "Error", "Time"), *ranking(chart)]:
+    for on_front, name, error, time in [(False, iface_("Setting"), iface_("Error"), iface_("Time")), *ranking(chart)]:
         row = column.split(factor=0.62)
-        row.label(text=name, icon="SOLO_ON" if on_front else "BLANK1")
+        row.label(text=name, translate=False, icon="SOLO_ON" if on_front else "BLANK1")
         cells = row.row()
-        cells.label(text=error)
-        cells.label(text=time)
+        cells.label(text=error, translate=False)
+        cells.label(text=time, translate=False)
 
 
 def _load_image(path: Path) -> None:

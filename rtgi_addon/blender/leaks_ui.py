@@ -2,6 +2,8 @@
 
 import bpy
 import numpy as np
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..errors import BakeError
 from ..evaluate.leaks import Cause, find_leaks
@@ -10,6 +12,7 @@ from ..transport.context import LightContext
 from .modal_job import GRACE, ModalJob
 from .panels import draw_lines
 from .session import redraw, session
+from .translations import sentence
 from .worker import BakeWorker
 
 
@@ -53,10 +56,10 @@ class RTGI_OT_find_leaks(ModalJob, bpy.types.Operator):
     def poll(cls, context):
         """Only with a bake of this session, and not while another one runs."""
         if leaks.running or session.running:
-            cls.poll_message_set("A bake or a search is already running")
+            cls.poll_message_set(rpt_("A bake or a search is already running"))
             return False
         if (context.scene.name, context.scene.rtgi.technique) not in session.baked:
-            cls.poll_message_set("Bake with this technique first: a bake from disk has no scene to compare with")
+            cls.poll_message_set(rpt_("Bake with this technique first: a bake from disk has no scene to compare with"))
             return False
         return True
 
@@ -65,7 +68,7 @@ class RTGI_OT_find_leaks(ModalJob, bpy.types.Operator):
         try:
             self._require_ended("search")
         except BakeError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, sentence(str(error)))
             return False
         key = context.scene.name, context.scene.rtgi.technique
         baked, points = session.baked[key], self.points
@@ -79,14 +82,14 @@ class RTGI_OT_find_leaks(ModalJob, bpy.types.Operator):
     def _finish(self):
         outcome = leaks.worker.outcome
         if outcome.error:
-            self.report({"ERROR"}, outcome.error)
+            self.report({"ERROR"}, sentence(outcome.error))
             return {"CANCELLED"}
         if outcome.cancelled:
-            self.report({"INFO"}, "Search cancelled; what was found before is kept")
+            self.report({"INFO"}, rpt_("Search cancelled; what was found before is kept"))
             return {"CANCELLED"}
         leaks.found[leaks.searching] = outcome.summary
         redraw()
-        self.report({"INFO"}, outcome.summary[1].lines()[0])
+        self.report({"INFO"}, sentence(outcome.summary[1].lines()[0]))
         return {"FINISHED"}
 
 
@@ -108,15 +111,16 @@ class RTGI_PT_leaks(bpy.types.Panel):
         if found is None:
             return
         field, leak_map = found
-        lines = leak_map.lines()
-        for number, line in enumerate(lines):
-            draw_lines(layout, line, width, "ERROR" if number == 0 and len(lines) > 1 else "BLANK1" if number else "CHECKMARK")
+        counts = leak_map.counts()
+        draw_lines(layout, sentence(leak_map.lines()[0]), width, "ERROR" if counts else "CHECKMARK")
+        for cause, count in counts.items():
+            draw_lines(layout, f"{count:,}: {sentence(cause.text)}", width, "BLANK1")
         row = leak_map.nearest(np.array(scene.cursor.location))
         if row is not None:
-            draw_lines(layout, f"At the 3D cursor: {at_receiver(leak_map, row)}", width, "PIVOT_CURSOR")
+            draw_lines(layout, iface_("At the 3D cursor: {error}").format(error=at_receiver(leak_map, row)), width, "PIVOT_CURSOR")
         baked = session.baked.get((scene.name, scene.rtgi.technique))
         if baked is None or baked.field is not field:
-            draw_lines(layout, "Found in an earlier bake", width, "INFO")
+            draw_lines(layout, iface_("Found in an earlier bake"), width, "INFO")
         layout.prop(scene.rtgi_preview, "leaks", text="Show on Surfaces")
 
 
@@ -124,7 +128,7 @@ def at_receiver(leak_map, row: int) -> str:
     """What a LeakMap says of one receiver."""
     cause = Cause(int(leak_map.cause[row]))
     off = f"{100.0 * leak_map.error[row]:+.0f}%"
-    return off if cause is Cause.NONE else f"{off}, {cause.text}"
+    return off if cause is Cause.NONE else f"{off}, {sentence(cause.text)}"
 
 
 @bpy.app.handlers.persistent

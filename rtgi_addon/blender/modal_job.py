@@ -3,6 +3,7 @@
 import bpy
 
 from ..errors import BakeError
+from .progress_text import status_text
 from .session import redraw, redraw_progress
 from .worker import Report
 
@@ -64,8 +65,7 @@ class ModalJob:
             raise BakeError(f"the {what} that was cancelled is still ending", "try again in a moment")
 
     def _show(self, context, report: Report) -> None:
-        stopping = self.job.worker.progress.cancelled
-        context.workspace.status_text_set("RTGI: cancelling…" if stopping else f"RTGI: {report.text}  |  Esc to cancel")
+        context.workspace.status_text_set(status_text(report, self.job.worker.progress.cancelled))
         redraw_progress()
 
     def _clean_up(self, context) -> None:

@@ -4,10 +4,13 @@ Blender happens here, on its main thread."""
 from pathlib import Path
 
 import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..errors import BakeError
 from .bake_job import check, fitted_volume, last_bake_of, prepare, record
+from .progress_text import status_text
 from .session import redraw, redraw_progress, session
+from .translations import sentence
 from .worker import BakeWorker, Report, duration
 
 _TICK = 0.1
@@ -25,10 +28,10 @@ class RTGI_OT_bake(bpy.types.Operator):
     def poll(cls, context):
         """Not twice at a time, and not in the middle of an edit."""
         if session.running and not session.worker.progress.cancelled:
-            cls.poll_message_set("A bake is already running")
+            cls.poll_message_set(rpt_("A bake is already running"))
             return False
         if context.mode != "OBJECT":
-            cls.poll_message_set("Baking reads the scene in Object Mode")
+            cls.poll_message_set(rpt_("Baking reads the scene in Object Mode"))
             return False
         return True
 
@@ -92,7 +95,7 @@ class RTGI_OT_bake(bpy.types.Operator):
             bake = prepare(context)
         except BakeError as error:
             session.errors[scene.name] = str(error)
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, sentence(str(error)))
             redraw()
             return None
         session.worker, session.baking = BakeWorker(bake, on_report), scene.name
@@ -103,24 +106,24 @@ class RTGI_OT_bake(bpy.types.Operator):
         session.baking = ""
         redraw()
         if outcome.cancelled:
-            self.report({"INFO"}, "Bake cancelled; the last one is as it was")
+            self.report({"INFO"}, rpt_("Bake cancelled; the last one is as it was"))
             return {"CANCELLED"}
         if outcome.error:
             if scene is not None:
                 session.errors[scene.name] = outcome.error
-            self.report({"ERROR"}, outcome.error)
+            self.report({"ERROR"}, sentence(outcome.error))
             return {"CANCELLED"}
         if scene is not None:
             record(scene, outcome.summary)
         done = last_bake_of(outcome.summary)
-        error = f", estimated error {100 * done['error']:.2g}%" if done["error"] >= 0 else ""
-        self.report({"INFO"}, f"Baked {done['probes']:,} probes in {duration(done['seconds'])}{error}")
+        text = rpt_("Baked {probes:,} probes in {time}, estimated error {error:.2g}%") if done["error"] >= 0 else \
+            rpt_("Baked {probes:,} probes in {time}")
+        self.report({"INFO"}, text.format(probes=done["probes"], time=duration(done["seconds"]), error=100 * done["error"]))
         return {"FINISHED"}
 
     def _show(self, context, report: Report) -> None:
-        stopping = session.worker.progress.cancelled
         context.window_manager.progress_update(100 * report.fraction)
-        context.workspace.status_text_set("RTGI: cancelling…" if stopping else f"RTGI: {report.text}  |  Esc to cancel")
+        context.workspace.status_text_set(status_text(report, session.worker.progress.cancelled))
         redraw_progress()
 
     def _clean_up(self, context) -> None:
@@ -173,11 +176,15 @@ class RTGI_OT_check(bpy.types.Operator):
             findings = check(context)
         except BakeError as error:
             session.errors[context.scene.name] = str(error)
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, sentence(str(error)))
             return {"CANCELLED"}
         session.errors.pop(context.scene.name, None)
         count = sum(finding.severity != "note" for finding in findings)
-        self.report({"INFO"}, f"{count} thing{'s' * (count > 1)} to look at" if count else "Nothing stands in the way of a bake")
+        if count:
+            text = rpt_("1 thing to look at") if count == 1 else rpt_("{count} things to look at").format(count=count)
+        else:
+            text = rpt_("Nothing stands in the way of a bake")
+        self.report({"INFO"}, text)
         redraw()
         return {"FINISHED"}
 
@@ -199,7 +206,7 @@ class RTGI_OT_fit_volume(bpy.types.Operator):
         try:
             fitted = fitted_volume(context)
         except BakeError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, sentence(str(error)))
             return {"CANCELLED"}
         probe = bpy.data.lightprobes.new("Probe Volume", "VOLUME")
         probe.resolution_x, probe.resolution_y, probe.resolution_z = fitted.resolution
@@ -211,7 +218,8 @@ class RTGI_OT_fit_volume(bpy.types.Operator):
         volume.select_set(True)
         context.view_layer.objects.active = volume
         nx, ny, nz = fitted.resolution
-        self.report({"INFO"}, f"Added {volume.name} with {nx} × {ny} × {nz} = {nx * ny * nz:,} probes")
+        self.report({"INFO"}, rpt_("Added {volume} with {x} × {y} × {z} = {probes:,} probes").format(
+            volume=volume.name, x=nx, y=ny, z=nz, probes=nx * ny * nz))
         return {"FINISHED"}
 
 
@@ -231,7 +239,7 @@ class RTGI_OT_open_folder(bpy.types.Operator):
         """Open it, if it is still there."""
         folder = Path(context.scene.rtgi.last_bake.folder)
         if not folder.is_dir():
-            self.report({"ERROR"}, f"{folder} is no longer there: bake again")
+            self.report({"ERROR"}, rpt_("{folder} is no longer there: bake again").format(folder=folder))
             return {"CANCELLED"}
         bpy.ops.wm.path_open(filepath=str(folder))
         return {"FINISHED"}

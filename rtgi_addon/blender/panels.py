@@ -5,11 +5,15 @@ from dataclasses import fields
 from pathlib import Path
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 
 from ..techniques import registry
 from ..transport.rays import slow_rays_warning
+from .preset_ui import RTGI_PT_presets
+from .progress_text import bar_text, step_text
 from .properties import GOALS, attribute, has_goal, value_type
 from .session import session
+from .translations import sentence
 from .worker import duration
 
 # Mean width of a letter of the interface's font [px], and how few go on a line however narrow the region is.
@@ -18,13 +22,14 @@ _ICONS = {"error": "CANCEL", "warning": "ERROR", "note": "INFO"}
 
 
 def draw_lines(layout, text: str, width: int, icon: str = "NONE") -> None:
-    """``text`` over as many labels as a region of ``width`` pixels needs; the icon stands before the first."""
+    """``text``, in the user's language already, over as many labels as a region of ``width`` pixels needs; the icon stands before
+    the first."""
     scale = bpy.context.preferences.system.ui_scale or 1.0  # 0 without a window
     characters = max(int((width - 60) / (_LETTER * scale)), _FEWEST_LETTERS)
     column = layout.column(align=True)
     column.scale_y = 0.8
     for number, line in enumerate(textwrap.wrap(text, characters) or [""]):
-        column.label(text=line, icon=icon if number == 0 else ("NONE" if icon == "NONE" else "BLANK1"))
+        column.label(text=line, translate=False, icon=icon if number == 0 else ("NONE" if icon == "NONE" else "BLANK1"))
 
 
 def _sentence(text: str) -> str:
@@ -35,7 +40,7 @@ def draw_slow_rays(layout, width: int) -> None:
     """Say so where there is no Embree, before the user waits for a bake."""
     warning = slow_rays_warning()
     if warning:
-        draw_lines(layout.box(), _sentence(warning), width, "INFO")
+        draw_lines(layout.box(), _sentence(sentence(warning)), width, "INFO")
 
 
 def draw_actions(layout, context, width: int) -> None:
@@ -48,19 +53,18 @@ def draw_actions(layout, context, width: int) -> None:
         if error:
             box = layout.box()
             box.alert = True
-            draw_lines(box, error, width, "CANCEL")
+            draw_lines(box, sentence(error), width, "CANCEL")
         return
     report = session.worker.report
     stopping = session.worker.progress.cancelled
     column = layout.column(align=True)
     row = column.row(align=True)
     row.scale_y = 1.5
-    left = "" if report.seconds_left is None else f"  ·  {duration(report.seconds_left)} left"
-    row.progress(factor=report.fraction, type="BAR", text="Cancelling…" if stopping else f"{100 * report.fraction:.0f}%{left}")
+    row.progress(factor=report.fraction, type="BAR", text=bar_text(report, stopping), translate=False)
     button = row.row(align=True)
     button.enabled = not stopping
     button.operator("rtgi.cancel", text="", icon="CANCEL")
-    step = _sentence(report.label) or "Starting"
+    step = step_text(report)
     draw_lines(layout, step if session.baking == context.scene.name else f"{session.baking}: {step}", width, "SORTTIME")
 
 
@@ -69,11 +73,12 @@ def draw_volumes(layout, context, width: int) -> None:
     volumes = [obj for obj in context.scene.objects
                if obj.type == "LIGHT_PROBE" and obj.data.type == "VOLUME" and not obj.hide_render]
     if not volumes:
-        draw_lines(layout, "No Light Probe Volume: one will be fitted to the scene", width, "INFO")
+        draw_lines(layout, iface_("No Light Probe Volume: one will be fitted to the scene"), width, "INFO")
         layout.operator("rtgi.fit_volume", icon="ADD")
         return
     count = sum(obj.data.resolution_x * obj.data.resolution_y * obj.data.resolution_z for obj in volumes)
-    layout.label(text=f"{count:,} probes in {len(volumes)} volume{'s' * (len(volumes) > 1)}", icon="OUTLINER_OB_LIGHTPROBE")
+    text = iface_("{probes:,} probes in 1 volume") if len(volumes) == 1 else iface_("{probes:,} probes in {volumes} volumes")
+    layout.label(text=text.format(probes=count, volumes=len(volumes)), translate=False, icon="OUTLINER_OB_LIGHTPROBE")
 
 
 def draw_setting(layout, group, technique, item, toggle: str | None = None) -> None:
@@ -99,6 +104,10 @@ class RTGI_PT_render(bpy.types.Panel):
     bl_region_type = "WINDOW"
     bl_context = "render"
     bl_options = {"DEFAULT_CLOSED"}
+
+    def draw_header_preset(self, context):
+        """The popover of presets."""
+        RTGI_PT_presets.draw_panel_header(self.layout)
 
     def draw(self, context):
         """Technique, when to stop, the technique's own settings."""
@@ -206,21 +215,21 @@ class RTGI_PT_last_bake(bpy.types.Panel):
             return
         width = context.region.width
         if session.stale.get(context.scene.name):
-            draw_lines(layout, "The scene or its settings have changed since", width, "ERROR")
+            draw_lines(layout, iface_("The scene or its settings have changed since"), width, "ERROR")
         folder = Path(last.folder)
         figures = [
-            ("Probes", f"{last.probes:,}"),
-            ("Usable", f"{100 * last.usable:.1f}%"),
-            ("Estimated Error", f"{100 * last.error:.2g}%" if last.error >= 0 else "unknown"),
-            ("Time", duration(last.seconds)),
+            (iface_("Probes"), f"{last.probes:,}"),
+            (iface_("Usable"), f"{100 * last.usable:.1f}%"),
+            (iface_("Estimated Error"), f"{100 * last.error:.2g}%" if last.error >= 0 else iface_("unknown")),
+            (iface_("Time"), duration(last.seconds)),
         ]
         column = layout.column(align=True)
         for name, value in figures:
             row = column.split(factor=0.5)
-            row.label(text=name)
-            row.label(text=value)
+            row.label(text=name, translate=False)
+            row.label(text=value, translate=False)
         row = layout.row(align=True)
-        row.label(text=folder.name, icon="FILE_FOLDER")
+        row.label(text=folder.name, translate=False, icon="FILE_FOLDER")
         row.operator("rtgi.open_folder", text="", icon="FILEBROWSER")
 
 
@@ -238,7 +247,7 @@ class RTGI_PT_checks(bpy.types.Panel):
         layout = self.layout
         findings = session.findings.get(context.scene.name)
         for finding in findings or ():
-            draw_lines(layout, finding.text, context.region.width, _ICONS[finding.severity])
+            draw_lines(layout, sentence(finding.text), context.region.width, _ICONS[finding.severity])
         if findings is not None and not findings:
             layout.label(text="Nothing to report", icon="CHECKMARK")
         layout.operator("rtgi.check", icon="VIEWZOOM")

@@ -1,11 +1,13 @@
 """Where the preview is set: Properties › Render and View Layer while RTGI is the engine, and the 3D view's header."""
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 
 from .engine import ENGINE_ID
 from .engine.shown import shown_for
 from .engine.viewport import STALE, is_stale
 from .panels import draw_lines
+from .translations import sentence
 
 
 class _OfOurEngine:
@@ -41,9 +43,9 @@ class RTGI_PT_preview(_OfOurEngine, bpy.types.Panel):
         layout.prop(preview, "resolution_scale")
         shown = shown_for(scene)
         if shown.note:
-            draw_lines(layout, shown.note, context.region.width, "INFO")
+            draw_lines(layout, sentence(shown.note), context.region.width, "INFO")
         elif is_stale(scene, shown):
-            draw_lines(layout, STALE, context.region.width, "ERROR")
+            draw_lines(layout, iface_(STALE), context.region.width, "ERROR")
 
 
 class RTGI_PT_preview_shadows(_OfOurEngine, bpy.types.Panel):
@@ -102,7 +104,7 @@ class RTGI_PT_preview_compare(_OfOurEngine, bpy.types.Panel):
         layout.prop(scene.rtgi_preview, "split")
         other = shown_for(scene, scene.rtgi_preview.compare_technique)
         if other.note:
-            draw_lines(layout, other.note, context.region.width, "INFO")
+            draw_lines(layout, sentence(other.note), context.region.width, "INFO")
 
 
 class RTGI_PT_film(_OfOurEngine, bpy.types.Panel):

@@ -74,8 +74,10 @@ def register() -> None:
     _group = _scene_group()
     bpy.utils.register_class(_group)
     bpy.utils.register_class(RTGI_PG_view_layer)
-    bpy.types.Scene.rtgi_preview = bpy.props.PointerProperty(type=_group, name="RTGI Preview")
-    bpy.types.ViewLayer.rtgi = bpy.props.PointerProperty(type=RTGI_PG_view_layer, name="RTGI Passes")
+    bpy.types.Scene.rtgi_preview = bpy.props.PointerProperty(
+        type=_group, name="RTGI Preview", description="What the preview shows, and how much work a frame may be")
+    bpy.types.ViewLayer.rtgi = bpy.props.PointerProperty(
+        type=RTGI_PG_view_layer, name="RTGI Passes", description="Passes of a render with the engine RTGI")
 
 
 def unregister() -> None:

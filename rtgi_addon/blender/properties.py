@@ -42,19 +42,41 @@ def value_type(technique: Technique, name: str) -> tuple[type, bool]:
     return plain[0], type(None) in options
 
 
-def tooltip(item) -> str:
-    """The description of a ``Settings`` field with its unit and range, as Blender writes tooltips: without a full stop."""
+def tooltip(item, translate: Callable[[str], str] = str) -> str:
+    """The description of a ``Settings`` field with its unit and range, as Blender writes tooltips: without a full stop.
+    ``translate`` is given what it is made of."""
     meta = item.metadata
-    text = meta["description"].rstrip(".")
+    text = translate(meta["description"].rstrip("."))
     low, high, unit = meta.get("minimum"), meta.get("maximum"), meta.get("unit")
     unit = f" {unit}" if unit else ""
     if meta.get("choices"):
         return text
     if low is not None and high is not None:
-        return f"{text} ({low:g} to {high:g}{unit})"
+        return f"{text} ({translate('{0} to {1}').format(_plain(low), _plain(high))}{unit})"
     if low is not None:
-        return f"{text} (at least {low:g}{unit})"
-    return f"{text} (in{unit})" if unit else text
+        return f"{text} ({translate('at least {0}').format(_plain(low))}{unit})"
+    return f"{text} ({translate('in {0}').format(unit.strip())})" if unit else text
+
+
+def override_texts(label: str, translate: Callable[[str], str] = str) -> tuple[str, str]:
+    """Label and tooltip of the switch that lets a volume override a setting called ``label``."""
+    return tuple(translate(text).format(translate(label)) for text in (
+        "Override {0}", "Use another value of {0} for this volume than the scene's"))
+
+
+def use_text(label: str, translate: Callable[[str], str] = str) -> str:
+    """Label of the switch before a setting called ``label`` that may be left to the technique."""
+    return translate("Use {0}").format(translate(label))
+
+
+def choice_label(choice) -> str:
+    """What a choice of a setting is called."""
+    return str(choice).replace("_", " ").capitalize()
+
+
+def _plain(number: float) -> str:
+    """A bound as a person writes it: no exponents."""
+    return f"{number:,.6f}".rstrip("0").rstrip(".")
 
 
 def blender_property(technique: Technique, item):
@@ -63,7 +85,7 @@ def blender_property(technique: Technique, item):
     meta = item.metadata
     common = {"name": meta["label"], "description": tooltip(item), "update": _changed}
     if meta.get("choices"):
-        items = [(str(choice), str(choice).replace("_", " ").capitalize(), common["description"]) for choice in meta["choices"]]
+        items = [(str(choice), choice_label(choice), common["description"]) for choice in meta["choices"]]
         default = meta["choices"][0] if item.default is None else item.default
         return bpy.props.EnumProperty(items=items, default=str(default), **common)
     if kind is bool:
@@ -91,12 +113,11 @@ def settings_group(technique: Technique, overrides: bool) -> type:
     for item in fields(technique.Settings):
         label = item.metadata["label"]
         if overrides:
-            annotations[f"override_{item.name}"] = bpy.props.BoolProperty(
-                name=f"Override {label}", update=_changed,
-                description=f"Use another value of {label} for this volume than the scene's")
+            name, description = override_texts(label)
+            annotations[f"override_{item.name}"] = bpy.props.BoolProperty(name=name, description=description, update=_changed)
         if value_type(technique, item.name)[1] and item.name not in GOALS:
             annotations[f"use_{item.name}"] = bpy.props.BoolProperty(
-                name=f"Use {label}", description=tooltip(item), default=item.default is not None, update=_changed)
+                name=use_text(label), description=tooltip(item), default=item.default is not None, update=_changed)
         annotations[item.name] = blender_property(technique, item)
     suffix = attribute(technique.name) + ("_overrides" if overrides else "")
     return type(f"RTGI_PG_{suffix}", (bpy.types.PropertyGroup,), {"__annotations__": annotations})
@@ -192,16 +213,20 @@ def _scene_group(techniques: dict[str, Technique], groups: dict[str, type]) -> t
             name="Stop At", description="What ends the tracing of a probe", default="ERROR", update=_changed,
             items=[("ERROR", "Error", "Trace each probe until its estimated error is small enough"),
                    ("RAYS", "Rays", "Trace the same number of rays for every probe")]),
-        "last_bake": bpy.props.PointerProperty(type=RTGI_PG_last_bake),
+        "last_bake": bpy.props.PointerProperty(
+            type=RTGI_PG_last_bake, name="Last Bake", description="What the last bake of this scene was"),
     }
     for name, group in groups.items():
-        annotations[attribute(name)] = bpy.props.PointerProperty(type=group, name=techniques[name].label)
+        annotations[attribute(name)] = _pointer(techniques[name], group)
     return type("RTGI_PG_scene", (bpy.types.PropertyGroup,), {"__annotations__": annotations, "use_preset": use_preset})
 
 
+def _pointer(technique: Technique, group: type):
+    return bpy.props.PointerProperty(type=group, name=technique.label, description=f"Settings of the technique {technique.label}")
+
+
 def _volume_group(techniques: dict[str, Technique], groups: dict[str, type]) -> type:
-    annotations = {attribute(name): bpy.props.PointerProperty(type=group, name=techniques[name].label)
-                   for name, group in groups.items()}
+    annotations = {attribute(name): _pointer(techniques[name], group) for name, group in groups.items()}
     return type("RTGI_PG_volume", (bpy.types.PropertyGroup,), {"__annotations__": annotations, "overrides": overrides})
 
 

@@ -6,18 +6,23 @@ from . import (
     chart_ui,
     cli,
     engine,
+    export_ui,
     handlers,
     leaks_ui,
     operators,
     panels,
+    plan_ui,
+    preset_ui,
     preview_panels,
     preview_settings,
     properties,
     stability_ui,
+    translations,
 )
 
 _MODULES = (
-    properties, preview_settings, operators, panels, chart_ui, stability_ui, leaks_ui, preview_panels, engine, handlers, cli,
+    translations, properties, preview_settings, preset_ui, operators, panels, plan_ui, chart_ui, stability_ui, leaks_ui, export_ui,
+    preview_panels, engine, handlers, cli,
 )
 _registered: list[ModuleType] = []
 

@@ -1,6 +1,8 @@
 """The stability suite in Blender: an operator that measures on a worker thread, and its report as a text data-block."""
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from .. import techniques
 from ..errors import BakeError
@@ -11,6 +13,7 @@ from .bake_job import output_folder
 from .extract import extract_scene
 from .modal_job import GRACE, ModalJob
 from .session import redraw, session
+from .translations import sentence
 from .worker import BakeWorker
 
 _TEXT = "RTGI Stability"
@@ -56,7 +59,7 @@ changed that should not have"""
     def poll(cls, context):
         """Not while something else is measured or baked."""
         if suite.running or session.running:
-            cls.poll_message_set("A bake or a measurement is already running")
+            cls.poll_message_set(rpt_("A bake or a measurement is already running"))
             return False
         return True
 
@@ -71,7 +74,7 @@ changed that should not have"""
             output = output_folder(context.scene.rtgi.output)
             folder = output.with_name(output.name + "_stability")
         except BakeError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, sentence(str(error)))
             return False
 
         def measure(progress: Progress):
@@ -84,23 +87,26 @@ changed that should not have"""
         outcome = suite.worker.outcome
         redraw()
         if outcome.error:
-            self.report({"ERROR"}, outcome.error)
+            self.report({"ERROR"}, sentence(outcome.error))
             return {"CANCELLED"}
         if outcome.cancelled:
-            self.report({"INFO"}, "Stability test cancelled; what was measured is beside the bake's folder")
+            self.report({"INFO"}, rpt_("Stability test cancelled; what was measured is beside the bake's folder"))
             return {"CANCELLED"}
         report = outcome.summary
         text = bpy.data.texts.get(_TEXT) or bpy.data.texts.new(_TEXT)
         text.from_string(report.to_markdown())
         failed = [result for result in report.results if result.verdict in (WORSE, ABOVE)]
-        listed = ", ".join(f"{result.case.name} of {result.technique}" for result in failed)
+        listed = ", ".join(rpt_("{case} of {technique}").format(case=result.case.name, technique=result.technique)
+                           for result in failed)
         if not failed:
-            self.report({"INFO"}, f"{len(report.results)} figures hold. See the text {_TEXT!r} and {report.out}")
+            self.report({"INFO"}, rpt_("{count} figures hold. See the text {text!r} and {folder}").format(
+                count=len(report.results), text=_TEXT, folder=report.out))
         elif self.own:
-            self.report({"INFO"}, f"{len(failed)} of {len(report.results)} figures are above their goals: {listed}. The text "
-                                  f"{_TEXT!r} says what helps")
+            self.report({"INFO"}, rpt_("{failed} of {count} figures are above their goals: {listed}. The text {text!r} says what "
+                                       "helps").format(failed=len(failed), count=len(report.results), listed=listed, text=_TEXT))
         else:
-            self.report({"WARNING"}, f"Worse than their bounds: {listed}. See the text {_TEXT!r}")
+            self.report({"WARNING"}, rpt_("Worse than their bounds: {listed}. See the text {text!r}").format(
+                listed=listed, text=_TEXT))
         return {"FINISHED"}
 
 
@@ -117,12 +123,13 @@ class RTGI_PT_stability(bpy.types.Panel):
     def draw(self, context):
         """The buttons for this scene and for the built-in ones; which text holds the report."""
         layout = self.layout
-        for text, technique, own in (("Test This Scene", context.scene.rtgi.technique, True),
-                                     ("This Scene, All Techniques", "all", True), ("Built-in Scenes", "all", False)):
-            button = layout.operator("rtgi.stability", text=text)
+        for text, technique, own in ((iface_("Test This Scene"), context.scene.rtgi.technique, True),
+                                     (iface_("This Scene, All Techniques"), "all", True),
+                                     (iface_("Built-in Scenes"), "all", False)):
+            button = layout.operator("rtgi.stability", text=text, translate=False)
             button.technique, button.own = technique, own
         if _TEXT in bpy.data.texts:
-            layout.label(text=_TEXT, icon="TEXT")
+            layout.label(text=_TEXT, translate=False, icon="TEXT")
 
 
 _CLASSES = (RTGI_OT_stability, RTGI_PT_stability)

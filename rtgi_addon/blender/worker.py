@@ -25,16 +25,6 @@ class Report:
     label: str = ""
     seconds_left: float | None = None
 
-    @property
-    def text(self) -> str:
-        """One line for a status bar: share done, step, time left."""
-        parts = [f"{100.0 * self.fraction:.0f}%"]
-        if self.label:
-            parts.insert(0, self.label)
-        if self.seconds_left is not None:
-            parts.append(f"{duration(self.seconds_left)} left")
-        return ", ".join(parts)
-
 
 @dataclass(frozen=True)
 class Outcome:

@@ -5,9 +5,9 @@ import pkgutil
 from functools import cache
 
 from ..errors import UsageError
-from .base import Checkpoint, Field, ProbeGrid, Technique, setting, validate_settings, volumes_by_settings
+from .base import PRESETS, Checkpoint, Field, ProbeGrid, Technique, setting, validate_settings, volumes_by_settings
 
-__all__ = ["Checkpoint", "Field", "ProbeGrid", "Technique", "get", "names", "registry", "setting", "validate_settings",
+__all__ = ["PRESETS", "Checkpoint", "Field", "ProbeGrid", "Technique", "get", "names", "registry", "setting", "validate_settings",
            "volumes_by_settings"]
 
 

@@ -126,6 +126,9 @@ class Checkpoint:
         return None
 
 
+# From quick to exact. A technique without a preset keeps its settings.
+PRESETS = ("draft", "preview", "final")
+
 # What indirect irradiance is made of (PHYSICS.md §1).
 KNOWN_LIGHT = frozenset({"lamps", "emissive surfaces", "world", "bounces"})
 
@@ -136,7 +139,8 @@ class Technique(ABC):
     ``tolerance`` is the relative error of irradiance that it declares for scenes with a closed form, at default settings;
     ``knows`` names the light in its fields, of KNOWN_LIGHT; without "bounces" they hold the first bounce of it. ``devices`` says
     where it can bake; one that knows "gpu" takes ``kernels`` in its ``bake`` (techniques/kernels.py). ``lattices`` are factors of
-    the volumes' resolution at which a chart measures its defaults as well, if its field lives on the lattice.
+    the volumes' resolution at which a chart measures its defaults as well, if its field lives on the lattice. ``presets`` holds, by
+    name (of PRESETS), the settings that decide what quality costs; all of them name the same ones.
     """
 
     name: ClassVar[str]
@@ -147,6 +151,7 @@ class Technique(ABC):
     knows: ClassVar[frozenset[str]] = KNOWN_LIGHT
     devices: ClassVar[tuple[str, ...]] = ("cpu",)
     lattices: ClassVar[tuple[float, ...]] = ()
+    presets: ClassVar[dict[str, dict]] = {}
 
     @abstractmethod
     def bake(self, scene: Scene, settings, rng: np.random.Generator, progress: Progress, *, threads: int | None = None,

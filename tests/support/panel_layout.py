@@ -16,7 +16,7 @@ class Layout:
 
     row = column = split = box = _sub
 
-    def label(self, text="", icon="NONE"):
+    def label(self, text="", icon="NONE", translate=True):
         assert icon in ICONS
         self.texts.append(text)
 
@@ -24,11 +24,11 @@ class Layout:
         assert name in data.bl_rna.properties and icon in ICONS
         self.shown.append(name)
 
-    def operator(self, name, text=None, icon="NONE"):
+    def operator(self, name, text=None, icon="NONE", translate=True):
         module, _, function = name.partition(".")
         assert getattr(getattr(bpy.ops, module), function).get_rna_type() and icon in ICONS
         self.shown.append(name)
 
-    def progress(self, text="", factor=0.0, type="RING"):
+    def progress(self, text="", factor=0.0, type="RING", translate=True):
         assert 0 <= factor <= 1 and type in {"BAR", "RING"}
         self.texts.append(text)

@@ -21,6 +21,7 @@ LONG, SHORT = 1 << 18, 64  # rays per probe: long enough to be interrupted, shor
 
 seen = {"error": "did not finish"}
 module = importlib.import_module(f"{ADDON}.blender.session")
+wording = importlib.import_module(f"{ADDON}.blender.progress_text")
 
 
 def session():
@@ -145,7 +146,7 @@ def watch(name):
         fractions.append(session().worker.report.fraction)
         rounds += 1
         yield 0.05
-    seen[name] = {"fractions": fractions, "rounds": rounds, "text": session().worker.report.text}
+    seen[name] = {"fractions": fractions, "rounds": rounds, "text": wording.status_text(session().worker.report, False)}
 
 
 def story():

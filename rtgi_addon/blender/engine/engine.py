@@ -3,8 +3,10 @@
 import traceback
 
 import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...errors import BakeError, Cancelled
+from ..translations import sentence
 from . import final, passes
 from .viewport import Viewport
 
@@ -37,10 +39,11 @@ class RTGI_RenderEngine(bpy.types.RenderEngine):
         except Cancelled:
             return
         except BakeError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, sentence(str(error)))
         except Exception as error:
             traceback.print_exc()
-            self.report({"ERROR"}, f"The render failed with {type(error).__name__}: {error} (details in the console)")
+            self.report({"ERROR"}, rpt_("The render failed with {kind}: {error} (details in the console)").format(
+                kind=type(error).__name__, error=error))
 
     def view_update(self, context, depsgraph):
         """The scene has changed, or a viewport has begun to show it."""

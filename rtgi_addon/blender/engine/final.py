@@ -10,6 +10,7 @@ from ...scene import Camera
 from ..extract import extract_scene
 from ..extract.cameras import read_camera
 from ..preview_settings import preview_settings
+from ..translations import sentence
 from .layer import OverlayLayer
 from .passes import add_passes, passes_of, write_passes
 from .shown import lit_for, shown_for
@@ -25,13 +26,13 @@ def render(engine, depsgraph) -> None:
     layer, original = depsgraph.view_layer, depsgraph.scene.original
     size = _result_size(engine, layer)
     progress = _progress(engine)
-    engine.update_stats("", "Reading the scene")
+    engine.update_stats("", sentence("Reading the scene"))
     scene = extract_scene(depsgraph, progress=progress.span(0.0, _READING), reuse=True)
     camera = cropped(_camera(depsgraph), depsgraph.scene.render, size)
     shown = shown_for(original)
     if shown.note:
-        engine.report({"INFO"}, shown.note)
-    engine.update_stats("", "Relighting")
+        engine.report({"INFO"}, sentence(shown.note))
+    engine.update_stats("", sentence("Relighting"))
     field = lit_for(shown, scene, progress.span(_READING, _READING + _RELIGHTING))
     settings = preview_settings(original, final=True)
     renderer = PreviewRenderer(scene, field, settings, tuple(entry.source for entry in passes_of(layer)),
@@ -99,7 +100,7 @@ def _progress(engine) -> Progress:
     def report(fraction, label, _seconds_left):
         engine.update_progress(fraction)
         if label:
-            engine.update_stats("", label)
+            engine.update_stats("", sentence(label))
 
     return _Breakable(engine, report)
 

@@ -3,10 +3,12 @@
 import traceback
 
 import numpy as np
+from bpy.app.translations import pgettext_iface as iface_
 
 from ...errors import BakeError
 from ..preview_settings import preview_settings
 from ..session import session
+from ..translations import sentence
 from .layer import OverlayLayer
 from .live import LiveScene, live_scene
 from .picture import Picture
@@ -51,7 +53,7 @@ class Viewport:
         shown = shown_for(scene)
         if live.scene is None:
             live.ask()
-            engine.update_stats("RTGI", live.error or "Reading the scene")
+            engine.update_stats("RTGI", sentence(live.error or "Reading the scene"))
             return
         if not self._broken:
             try:
@@ -61,7 +63,7 @@ class Viewport:
             except Exception as error:
                 traceback.print_exc()
                 self._broken = f"{type(error).__name__}: {error} (details in the console)"
-        engine.update_stats("RTGI", self._broken or self._status(scene, live, shown))
+        engine.update_stats("RTGI", sentence(self._broken) or self._status(scene, live, shown))
 
     def _frame(self, engine, context, scene, live: LiveScene, shown: Shown) -> None:
         from ...preview.camera_view import CameraView
@@ -98,13 +100,13 @@ class Viewport:
 
     def _status(self, scene, live: LiveScene, shown: Shown) -> str:
         renderer = self.picture.renderer
-        parts = [f"Sample {renderer.samples} of {renderer.settings.samples}"]
+        parts = [iface_("Sample {sample} of {samples}").format(sample=renderer.samples, samples=renderer.settings.samples)]
         if renderer.busy:
-            parts.append("Relighting")
+            parts.append(iface_("Relighting"))
         if is_stale(scene, shown):
-            parts.append(STALE)
+            parts.append(iface_(STALE))
         notes = [shown.note, live.error, renderer.error]
         if scene.rtgi_preview.compare:
             other = shown_for(scene, scene.rtgi_preview.compare_technique)
-            notes.append(other.note and f"Right of the line: {other.note}")
-        return " | ".join([*parts, *(text for text in notes if text)])
+            notes.append(other.note and iface_("Right of the line: {note}").format(note=sentence(other.note)))
+        return " | ".join([*parts, *(sentence(text) for text in notes if text)])

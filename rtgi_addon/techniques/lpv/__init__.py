@@ -45,6 +45,8 @@ class LightPropagationVolumes(Technique):
     Settings = LpvSettings
     tolerance = 0.65
     devices = ("cpu", "gpu")
+    presets = {"draft": {"resolution": 8, "steps": 64}, "preview": {"resolution": 16, "steps": 64},
+               "final": {"resolution": 16, "steps": 256}}
 
     def bake(self, scene: Scene, settings: LpvSettings, rng: np.random.Generator, progress: Progress, *,
              threads: int | None = None, checkpoint: Checkpoint | None = None, kernels: Kernels | None = None) -> Field:

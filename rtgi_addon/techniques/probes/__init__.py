@@ -32,6 +32,8 @@ class Probes(Technique):
     description = "Spherical harmonics of incident light on a lattice, the form that engines read"
     Settings = ProbeSettings
     lattices = (0.5, 2.0)
+    presets = {"draft": {"error": 0.1, "max_rays": 1 << 12}, "preview": {"error": 0.03, "max_rays": 1 << 14},
+               "final": {"error": 0.01, "max_rays": 1 << 15}}
 
     def bake(self, scene: Scene, settings: ProbeSettings, rng: np.random.Generator, progress: Progress, *,
              threads: int | None = None, checkpoint: Checkpoint | None = None) -> Field:

@@ -37,6 +37,9 @@ class ReflectiveShadowMaps(Technique):
     devices = ("cpu", "gpu")
     tolerance = 0.05
     knows = frozenset({"lamps"})
+    presets = {"draft": {"resolution": 128, "samples": 64, "visibility": False},
+               "preview": {"resolution": 256, "samples": 256, "visibility": True},
+               "final": {"resolution": 512, "samples": 1600, "visibility": True}}
 
     def bake(self, scene: Scene, settings: RsmSettings, rng: np.random.Generator, progress: Progress, *,
              threads: int | None = None, checkpoint: Checkpoint | None = None, kernels: Kernels | None = None) -> Field:

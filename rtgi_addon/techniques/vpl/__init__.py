@@ -41,6 +41,7 @@ class VirtualPointLights(Technique):
     Settings = VplSettings
     tolerance = 0.05
     devices = ("cpu", "gpu")
+    presets = {"draft": {"lights": 256}, "preview": {"lights": 1024}, "final": {"lights": 16384}}
 
     def bake(self, scene: Scene, settings: VplSettings, rng: np.random.Generator, progress: Progress, *,
              threads: int | None = None, checkpoint: Checkpoint | None = None, kernels: Kernels | None = None) -> Field:

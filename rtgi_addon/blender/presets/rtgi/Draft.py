@@ -1,0 +1,5 @@
+"""Draft: quick and rough; the values are the techniques' own."""
+
+import bpy
+
+bpy.context.scene.rtgi.use_preset("draft")

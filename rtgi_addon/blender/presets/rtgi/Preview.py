@@ -1,0 +1,5 @@
+"""Preview: for judging a picture; the values are the techniques' own."""
+
+import bpy
+
+bpy.context.scene.rtgi.use_preset("preview")

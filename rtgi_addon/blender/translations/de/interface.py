@@ -1,0 +1,397 @@
+"""Labels, tooltips and lines of the panels in German, by their English."""
+
+INTERFACE: dict[str, str] = {
+    # What labels and tooltips of settings are put together from.
+    "{0} to {1}": "{0} bis {1}",
+    "at least {0}": "mindestens {0}",
+    "in {0}": "in {0}",
+    "Override {0}": "{0} überschreiben",
+    "Use another value of {0} for this volume than the scene's": "Für dieses Volumen einen anderen Wert von „{0}“ als den der "
+    "Szene "
+                                                                 "verwenden",
+    "Use {0}": "{0} verwenden",
+
+    # Panels and their lines.
+    "RTGI": "RTGI",
+    "Output": "Ausgabe",
+    "Folder": "Ordner",
+    "RTGI Overrides": "RTGI-Abweichungen",
+    "Light Probes": "Lichtsonden",
+    "Last Bake": "Letztes Backen",
+    "Checks": "Prüfungen",
+    "RTGI Presets": "RTGI-Voreinstellungen",
+    "Techniques Compared": "Techniken im Vergleich",
+    "Leaks": "Lichtlecks",
+    "Stability": "Stabilität",
+    "Preview": "Vorschau",
+    "Shadow Maps": "Schattenkarten",
+    "Overlays": "Überlagerungen",
+    "Compare": "Vergleichen",
+    "Film": "Film",
+    "Passes": "Durchgänge",
+    "Data": "Daten",
+    "Light": "Licht",
+    "Show": "Anzeigen",
+    "Resolution": "Auflösung",
+    "Albedo": "Albedo",
+    "Transparent": "Transparent",
+    "Viewport Samples": "Abtastwerte im Ansichtsfenster",
+    "Split the Viewport": "Ansichtsfenster teilen",
+    "Starting": "Beginnt",
+    "Cancelling…": "Bricht ab …",
+    "{share}%  ·  {time} left": "{share} %  ·  noch {time}",
+    "{time} left": "noch {time}",
+    "RTGI: cancelling…": "RTGI: bricht ab …",
+    "RTGI: {progress}  |  Esc to cancel": "RTGI: {progress}  |  Esc bricht ab",
+    "No Light Probe Volume: one will be fitted to the scene": "Kein Lichtsondenvolumen: der Szene wird eines angepasst",
+    "{probes:,} probes in 1 volume": "{probes:,} Sonden in 1 Volumen",
+    "{probes:,} probes in {volumes} volumes": "{probes:,} Sonden in {volumes} Volumen",
+    "Nothing baked yet": "Noch nichts gebacken",
+    "The scene or its settings have changed since": "Die Szene oder ihre Einstellungen haben sich seither geändert",
+    "Probes": "Sonden",
+    "Usable": "Brauchbar",
+    "Estimated Error": "Geschätzter Fehler",
+    "unknown": "unbekannt",
+    "Time": "Zeit",
+    "Nothing to report": "Nichts zu melden",
+    "Setting": "Einstellung",
+    "Error": "Fehler",
+    "Cancelled before the end": "Vor dem Ende abgebrochen",
+    "At the 3D cursor: {error}": "Am 3D-Cursor: {error}",
+    "Found in an earlier bake": "In einem früheren Backvorgang gefunden",
+    "Show on Surfaces": "Auf Flächen zeigen",
+    "Test This Scene": "Diese Szene prüfen",
+    "This Scene, All Techniques": "Diese Szene, alle Techniken",
+    "Built-in Scenes": "Eingebaute Szenen",
+    "Sample {sample} of {samples}": "Abtastwert {sample} von {samples}",
+    "Relighting": "Beleuchtet neu",
+    "Right of the line: {note}": "Rechts der Linie: {note}",
+    "The bake is out of date": "Das Gebackene ist veraltet",
+
+    # Operators: labels, tooltips, what they report and why they are greyed out.
+    "Bake Probes": "Sonden backen",
+    "Bake the light of this scene into its Light Probe Volumes": "Das Licht dieser Szene in ihre Lichtsondenvolumen backen",
+    "A bake is already running": "Es wird schon gebacken",
+    "Baking reads the scene in Object Mode": "Gebacken wird im Objektmodus",
+    "Bake cancelled; the last one is as it was": "Backen abgebrochen; das letzte Ergebnis ist, wie es war",
+    "Baked {probes:,} probes in {time}, estimated error {error:.2g}%":
+        "{probes:,} Sonden in {time} gebacken, geschätzter Fehler {error:.2g} %",
+    "Baked {probes:,} probes in {time}": "{probes:,} Sonden in {time} gebacken",
+    "Cancel Bake": "Backen abbrechen",
+    "Stop the bake. What was baked before stays as it is": "Das Backen anhalten. Was vorher gebacken war, bleibt, wie es ist",
+    "Check Scene": "Szene prüfen",
+    "Read the scene as a bake would and list what would spoil it, without tracing a ray":
+        "Die Szene lesen wie zum Backen und auflisten, was es verdürbe, ohne einen Strahl zu verfolgen",
+    "1 thing to look at": "1 Auffälligkeit",
+    "{count} things to look at": "{count} Auffälligkeiten",
+    "Nothing stands in the way of a bake": "Dem Backen steht nichts im Weg",
+    "Add Fitted Volume": "Angepasstes Volumen hinzufügen",
+    "Add a Light Probe Volume that fits the scene, with evenly spaced probes":
+        "Ein Lichtsondenvolumen hinzufügen, das zur Szene passt, mit gleichmäßig verteilten Sonden",
+    "Added {volume} with {x} × {y} × {z} = {probes:,} probes": "{volume} mit {x} × {y} × {z} = {probes:,} Sonden hinzugefügt",
+    "Open Bake Folder": "Ordner öffnen",
+    "Show the folder of the last bake in the system's file browser":
+        "Den Ordner des letzten Backens in der Dateiverwaltung des Systems zeigen",
+    "{folder} is no longer there: bake again": "{folder} ist nicht mehr da: neu backen",
+    "Apply RTGI Preset": "RTGI-Voreinstellung anwenden",
+    "Bake with the settings of this preset": "Mit den Einstellungen dieser Voreinstellung backen",
+    "Add RTGI Preset": "RTGI-Voreinstellung hinzufügen",
+    "Keep the technique and its settings as a preset, or remove one":
+        "Die Technik und ihre Einstellungen als Voreinstellung behalten oder eine entfernen",
+    "Draft": "Entwurf",
+    "Final": "Endgültig",
+    "To see where light goes: probes with 10% error (0.2 s of processor time for the 64 of the Cornell box)":
+        "Um zu sehen, wohin Licht geht: Sonden mit 10 % Fehler (0,2 s Prozessorzeit für die 64 der Cornell-Box)",
+    "To judge a picture: probes with 3% error (0.3 s of processor time for the 64 of the Cornell box)":
+        "Um ein Bild zu beurteilen: Sonden mit 3 % Fehler (0,3 s Prozessorzeit für die 64 der Cornell-Box)",
+    "To ship: probes with 1% error (0.8 s of processor time for the 64 of the Cornell box)":
+        "Zum Ausliefern: Sonden mit 1 % Fehler (0,8 s Prozessorzeit für die 64 der Cornell-Box)",
+    "Chart Techniques": "Techniken vergleichen",
+    "Bake this scene with every technique at several settings and chart their errors against time, rays and memory":
+        "Diese Szene mit jeder Technik in mehreren Einstellungen backen und ihre Fehler über Zeit, Strahlen und Speicher auftragen",
+    "Seeds": "Startwerte",
+    "Bakes of each setting, from which intervals follow":
+        "Wie oft jede Einstellung gebacken wird; daraus folgen Vertrauensbereiche",
+    "Surface Points": "Punkte auf Flächen",
+    "Points on surfaces where errors are measured": "Punkte auf Flächen, an denen Fehler gemessen werden",
+    "Reference Noise": "Rauschen der Referenz",
+    "Relative noise at which the reference stops": "Relatives Rauschen, bei dem die Referenz aufhört",
+    "Error Maps": "Fehlerkarten",
+    "Also draw where in the scene each technique is wrong": "Auch zeichnen, wo in der Szene jede Technik irrt",
+    "Reference": "Referenz",
+    "What is held to be right": "Was als richtig gilt",
+    "Path Tracer": "Pfadverfolgung",
+    "This add-on's own path tracer": "Die eigene Pfadverfolgung dieses Add-ons",
+    "Cycles": "Cycles",
+    "Cycles, on the CPU; Blender waits while it renders": "Cycles auf der CPU; Blender wartet, solange es rendert",
+    "A chart or a bake is already running": "Es wird schon gemessen oder gebacken",
+    "Chart cancelled": "Vergleich abgebrochen",
+    "Chart cancelled; {count} settings are in {folder}": "Vergleich abgebrochen; {count} Einstellungen sind in {folder}",
+    "Charted {count} settings into {folder}": "{count} Einstellungen verglichen, Ergebnis in {folder}",
+    "Cancel Chart": "Vergleich abbrechen",
+    "Stop measuring. What was measured is kept": "Das Messen anhalten. Was gemessen ist, bleibt erhalten",
+    "Find Leaks": "Lichtlecks suchen",
+    "Compare the last bake of this session with the path reference on the scene's surfaces, and say why it is off where it is":
+        "Das zuletzt in dieser Sitzung Gebackene auf den Flächen der Szene mit der Pfadverfolgung vergleichen und sagen, warum es "
+        "abweicht, wo es abweicht",
+    "Points": "Punkte",
+    "How many points of surfaces are looked at": "Wie viele Punkte auf Flächen betrachtet werden",
+    "A bake or a search is already running": "Es wird schon gebacken oder gesucht",
+    "Bake with this technique first: a bake from disk has no scene to compare with":
+        "Erst mit dieser Technik backen: zu Gebackenem von der Platte gibt es keine Szene zum Vergleichen",
+    "Search cancelled; what was found before is kept": "Suche abgebrochen; vorher Gefundenes bleibt erhalten",
+    "Test Stability": "Stabilität prüfen",
+    "Bake this scene with its volumes and lamps moved, or built-in ones in which methods are known to fail, and report what "
+    "changed "
+    "that should not have":
+        "Diese Szene mit verschobenen Volumen und Lampen backen, oder eingebaute, an denen Verfahren bekanntermaßen scheitern, und "
+        "melden, was sich geändert hat und es nicht sollte",
+    "Which technique is tested": "Welche Technik geprüft wird",
+    "Case": "Fall",
+    "Only the case of this name; all if empty": "Nur der Fall dieses Namens; alle, wenn leer",
+    "This Scene": "Diese Szene",
+    "Test this scene instead of the built-in ones": "Diese Szene statt der eingebauten prüfen",
+    "A bake or a measurement is already running": "Es wird schon gebacken oder gemessen",
+    "Stability test cancelled; what was measured is beside the bake's folder":
+        "Prüfung abgebrochen; was gemessen ist, liegt neben dem Ordner des Backens",
+    "{case} of {technique}": "{case} von {technique}",
+    "{count} figures hold. See the text {text!r} and {folder}": "{count} Werte halten. Siehe den Text {text!r} und {folder}",
+    "{failed} of {count} figures are above their goals: {listed}. The text {text!r} says what helps":
+        "{failed} von {count} Werten liegen über ihren Zielen: {listed}. Der Text {text!r} sagt, was hilft",
+    "Worse than their bounds: {listed}. See the text {text!r}": "Schlechter als ihre Schranken: {listed}. Siehe den Text {text!r}",
+    "The render failed with {kind}: {error} (details in the console)":
+        "Das Rendern schlug mit {kind} fehl: {error} (Einzelheiten in der Konsole)",
+
+    # Export.
+    "Export": "Export",
+    "Godot 4.6": "Godot 4.6",
+    "3D textures, shader include, GDScript loader, LightmapGIData and a sample project":
+        "3D-Texturen, Shader-Include, GDScript-Lader, LightmapGIData und ein Beispielprojekt",
+    "three.js": "three.js",
+    "Probe volumes for WebGL: loader, material hook, light probe, demo page":
+        "Sondenvolumen für WebGL: Lader, Material-Hook, Lichtsonde, Beispielseite",
+    "Export to Engine": "In Engine exportieren",
+    "Write the last bake as textures, shaders and a sample scene of an engine":
+        "Das zuletzt Gebackene als Texturen, Shader und Beispielszene einer Engine schreiben",
+    "Engine": "Engine",
+    "For which engine the probes are written": "Für welche Engine die Sonden geschrieben werden",
+    "Where the export goes; an earlier export there is replaced": "Wohin der Export geht; ein früherer dort wird ersetzt",
+    "Model": "Modell",
+    "Write what renders of this scene as glTF into the sample scene, lit by the probes":
+        "Was von dieser Szene gerendert wird, als glTF in die Beispielszene schreiben, von den Sonden beleuchtet",
+    "A bake or an export is already running": "Es wird schon gebacken oder exportiert",
+    "Bake first: there is nothing in the output folder": "Erst backen: im Ausgabeordner liegt nichts",
+    "Export cancelled; an earlier one is as it was": "Export abgebrochen; ein früherer ist, wie er war",
+    "{count} files for {engine} in {folder}; README.md there says how to use them":
+        "{count} Dateien für {engine} in {folder}; README.md dort sagt, wie man sie benutzt",
+
+    # Scene: what and how to bake.
+    "Technique": "Technik",
+    "How indirect light is computed": "Wie indirektes Licht berechnet wird",
+    "Irradiance Probes": "Bestrahlungsstärke-Sonden",
+    "Spherical harmonics of incident light on a lattice, the form that engines read":
+        "Kugelflächenfunktionen des einfallenden Lichts auf einem Gitter, die Form, die Engines lesen",
+    "Virtual Point Lights": "Virtuelle Punktlichter",
+    "Instant radiosity: bounced light from virtual lights that can follow a moving lamp":
+        "Instant Radiosity: reflektiertes Licht von virtuellen Lichtern, die einer bewegten Lampe folgen können",
+    "Reflective Shadow Maps": "Reflektierende Schattenkarten",
+    "One bounce of the lamps, gathered from what each of them lights first; without occlusion, as in the paper":
+        "Eine Reflexion der Lampen, gesammelt von dem, was jede zuerst beleuchtet; ohne Verdeckung, wie im Artikel",
+    "Light Propagation Volumes": "Lichtausbreitungsvolumen",
+    "Light flows from cell to cell of a lattice: fast, smooth, leaks and spreads":
+        "Licht fließt von Zelle zu Zelle eines Gitters: schnell und weich, aber es leckt und zerfließt",
+    "Seed": "Startwert",
+    "Start of the random numbers. The same seed gives the same bytes":
+        "Anfang der Zufallszahlen. Derselbe Startwert ergibt dieselben Bytes",
+    "Device": "Gerät",
+    "Where the inner loops of the bake run": "Wo die inneren Schleifen des Backens laufen",
+    "CPU": "CPU",
+    "Every core of the processor": "Jeder Kern des Prozessors",
+    "GPU": "GPU",
+    "The graphics card that Blender draws with; the window waits for it":
+        "Die Grafikkarte, mit der Blender zeichnet; das Fenster wartet auf sie",
+    "Stop At": "Ende bei",
+    "What ends the tracing of a probe": "Was die Strahlverfolgung einer Sonde beendet",
+    "Trace each probe until its estimated error is small enough":
+        "Jede Sonde verfolgen, bis ihr geschätzter Fehler klein genug ist",
+    "Rays": "Strahlen",
+    "Trace the same number of rays for every probe": "Für jede Sonde gleich viele Strahlen verfolgen",
+    "Folder the bake is written to. An earlier bake in it is replaced once the new one is whole":
+        "Ordner, in den gebacken wird. Früher Gebackenes darin wird ersetzt, sobald das neue vollständig ist",
+    "Where the last bake lies": "Wo das zuletzt Gebackene liegt",
+    "The technique that made the last bake": "Die Technik, mit der zuletzt gebacken wurde",
+    "How many probes the last bake has, over all volumes": "Wie viele Sonden das zuletzt Gebackene in allen Volumen hat",
+    "Share of probes that lie in the open; the others take their light from neighbours":
+        "Anteil der Sonden, die frei liegen; die anderen nehmen ihr Licht von Nachbarn",
+    "Estimated relative error of the spherical harmonics against infinitely many rays; negative if unknown":
+        "Geschätzter relativer Fehler der Kugelflächenfunktionen gegenüber unendlich vielen Strahlen; negativ, wenn unbekannt",
+    "Seconds": "Sekunden",
+    "How long the last bake took": "Wie lange das letzte Backen gedauert hat",
+
+    # Settings that several techniques have.
+    "SH Order": "SH-Ordnung",
+    "Highest band of the spherical harmonics: 2 is what engines read, 1 is smaller":
+        "Höchstes Band der Kugelflächenfunktionen: 2 lesen Engines, 1 ist kleiner",
+    "Highest band of the spherical harmonics of the exported probes":
+        "Höchstes Band der Kugelflächenfunktionen der exportierten Sonden",
+    "Highest band of the spherical harmonics of the probes": "Höchstes Band der Kugelflächenfunktionen der Sonden",
+    "Highest band of the exported probes; the volumes themselves hold order 1":
+        "Höchstes Band der exportierten Sonden; die Volumen selbst enthalten Ordnung 1",
+    "Bounces": "Reflexionen",
+    "How often light may be reflected; unset follows it until it has died away":
+        "Wie oft Licht reflektiert werden darf; ohne Angabe, bis es verklungen ist",
+    "Include Lamps": "Lampen einschließen",
+    "Add the direct light of lamps, which engines usually add themselves":
+        "Das direkte Licht der Lampen hinzufügen, was Engines sonst selbst tun",
+    "Samples": "Abtastwerte",
+
+    # Irradiance probes.
+    "Target Error": "Zielfehler",
+    "Relative RMSE of the coefficients at which a probe stops tracing rays":
+        "Relativer RMSE der Koeffizienten, bei dem eine Sonde keine Strahlen mehr verfolgt",
+    "Rays per Probe": "Strahlen je Sonde",
+    "A fixed number of rays for every probe instead of a target error":
+        "Eine feste Zahl von Strahlen für jede Sonde statt eines Zielfehlers",
+    "Most Rays": "Höchstens Strahlen",
+    "No probe traces more rays than this, however noisy its surroundings":
+        "Mehr Strahlen verfolgt keine Sonde, wie verrauscht ihre Umgebung auch ist",
+    "Visibility Tile": "Sichtbarkeitskachel",
+    "Side of each probe's octahedral tile of distances": "Seitenlänge der oktaedrischen Kachel von Abständen jeder Sonde",
+    "Virtual Offset": "Virtueller Versatz",
+    "Move probes that lie just inside geometry out of it": "Sonden, die knapp in Geometrie liegen, aus ihr herausrücken",
+    "Texel Size": "Texelgröße",
+    "Side of the surface cache's texels; unset chooses it from scene, spacing and target error":
+        "Seitenlänge der Texel des Flächenspeichers; ohne Angabe aus Szene, Abstand und Zielfehler gewählt",
+    "Cache Rays": "Strahlen des Flächenspeichers",
+    "Rays from each texel of the surface cache; unset chooses them by the target error":
+        "Strahlen von jedem Texel des Flächenspeichers; ohne Angabe nach dem Zielfehler gewählt",
+
+    # Virtual point lights.
+    "Virtual Lights": "Virtuelle Lichter",
+    "How many virtual lights stand for all bounced light; time grows in proportion":
+        "Wie viele virtuelle Lichter für alles reflektierte Licht stehen; die Zeit wächst im gleichen Maß",
+    "Clamp": "Begrenzung",
+    "Bound of a virtual light's geometry term, against bright spots near surfaces; unset lets no light give more than the mean "
+    "irradiance, or a tenth of it with compensation; 0 has no bound":
+        "Schranke des Geometrieterms eines virtuellen Lichts gegen helle Flecken nahe an Flächen; ohne Angabe gibt kein Licht "
+        "mehr als "
+        "die mittlere Bestrahlungsstärke, mit Ausgleich ein Zehntel davon; 0 ist ohne Schranke",
+    "Compensation": "Ausgleich",
+    "Give back by short rays what the clamp takes away from corners":
+        "Mit kurzen Strahlen zurückgeben, was die Begrenzung Ecken nimmt",
+    "Compensation Rays": "Strahlen des Ausgleichs",
+    "Short rays per receiver": "Kurze Strahlen je Empfänger",
+    "Candidates": "Kandidaten",
+    "Virtual lights tried for each that is kept: of more, those that light the volumes are found more surely":
+        "Virtuelle Lichter, die für jedes behaltene versucht werden: unter mehr finden sich sicherer die, die die Volumen "
+        "beleuchten",
+
+    # Reflective shadow maps.
+    "Map Resolution": "Kartenauflösung",
+    "Every lamp has this number squared of texels, over all of its maps":
+        "Jede Lampe hat das Quadrat dieser Zahl an Texeln, in allen ihren Karten zusammen",
+    "Texels that each receiver reads of every lamp": "Texel, die jeder Empfänger von jeder Lampe liest",
+    "Every Texel": "Jedes Texel",
+    "Sum over all texels instead of sampling them: slow, the reference":
+        "Über alle Texel summieren, statt sie abzutasten: langsam, die Referenz",
+    "Test Visibility": "Sichtbarkeit prüfen",
+    "Trace a shadow ray to every sampled texel; the paper's gather has none and leaks through walls":
+        "Zu jedem abgetasteten Texel einen Schattenstrahl verfolgen; im Artikel gibt es keinen, und Licht geht durch Wände",
+    "Disk Radius": "Scheibenradius",
+    "Radius of the importance disk around the projected receiver, in sides of the map":
+        "Radius der Wichtigkeitsscheibe um den projizierten Empfänger, in Seitenlängen der Karte",
+    "Disk Share": "Scheibenanteil",
+    "Share of the samples in the disk; the others follow the flux. 1 is the paper's pattern, which misses what lies outside the "
+    "disk":
+        "Anteil der Abtastwerte in der Scheibe; die anderen folgen dem Lichtstrom. 1 ist das Muster des Artikels, dem entgeht, was "
+        "außerhalb der Scheibe liegt",
+    "Points per Area Lamp": "Punkte je Flächenlampe",
+    "From how many points an area lamp is captured": "Von wie vielen Punkten aus eine Flächenlampe aufgenommen wird",
+    "Sun Focus": "Sonnenausschnitt",
+    "A sun's map covers this many times the box around all volumes":
+        "Die Karte einer Sonne deckt dieses Vielfache des Quaders um alle Volumen ab",
+
+    # Light propagation volumes.
+    "Cells along each side of every cascade; light spreads with every cell it passes, so finer ones are not always more exact":
+        "Zellen entlang jeder Seite jeder Kaskade; Licht zerfließt mit jeder Zelle, feinere sind also nicht immer genauer",
+    "Cascades": "Kaskaden",
+    "Nested volumes of the same resolution, each with cells twice as large":
+        "Ineinander liegende Volumen gleicher Auflösung, jedes mit doppelt so großen Zellen",
+    "Cell Size": "Zellgröße",
+    "Side of the finest cascade's cells; unset fits that cascade around the probe volumes and the room they stand in":
+        "Seitenlänge der Zellen der feinsten Kaskade; ohne Angabe umfasst sie die Sondenvolumen und den Raum, in dem sie stehen",
+    "Center": "Mitte",
+    "What the cascades are centred on: 'volumes', 'camera' or the name of an object":
+        "Worum die Kaskaden liegen: „volumes“, „camera“ oder der Name eines Objekts",
+    "Steps": "Schritte",
+    "How often light moves on by one cell; games use 8, a room needs many times its cells":
+        "Wie oft Licht um eine Zelle weiterzieht; Spiele nehmen 8, ein Raum braucht ein Vielfaches seiner Zellen",
+    "Further Bounces": "Weitere Reflexionen",
+    "Reflect light that meets geometry while it is propagated":
+        "Licht reflektieren, das bei der Ausbreitung auf Geometrie trifft",
+    "Blocking": "Verdeckung",
+    "Let geometry stop light between cells": "Geometrie hält Licht zwischen Zellen auf",
+    "Occluders": "Verdecker",
+    "Geometry that blocks: all surfaces in the volume, or only what lamps and cameras see of it":
+        "Geometrie, die verdeckt: alle Flächen im Volumen, oder nur, was Lampen und Kameras davon sehen",
+    "Surfaces": "Flächen",
+    "Views": "Ansichten",
+    "Shadow Map Size": "Größe der Schattenkarten",
+    "Texels along a side of each lamp's reflective shadow maps":
+        "Texel entlang einer Seite der reflektierenden Schattenkarten jeder Lampe",
+    "Self-light Damping": "Dämpfung der Selbstbeleuchtung",
+    "Use the intensity's derivative along the normal to keep surfaces from lighting themselves":
+        "Mit der Ableitung der Intensität entlang der Normale verhindern, dass Flächen sich selbst beleuchten",
+
+    # Preview.
+    "Frames that are averaged until a still picture is done": "Bilder, die gemittelt werden, bis ein ruhendes Bild fertig ist",
+    "Share of the region's width and height that is rendered": "Anteil von Breite und Höhe des Bereichs, der gerendert wird",
+    "What the viewport shows": "Was das Ansichtsfenster zeigt",
+    "Combined": "Kombiniert",
+    "Direct": "Direkt",
+    "Indirect": "Indirekt",
+    "Irradiance": "Bestrahlungsstärke",
+    "Normal": "Normale",
+    "Depth": "Tiefe",
+    "Shadow Map": "Schattenkarte",
+    "Texels along each side of a shadow map": "Texel entlang jeder Seite einer Schattenkarte",
+    "Sun Cascades": "Kaskaden der Sonne",
+    "Shadow maps a sun has, for near to far parts of the view":
+        "Schattenkarten einer Sonne, für nahe bis ferne Teile der Ansicht",
+    "Shadow Views": "Schattenansichten",
+    "Shadow maps drawn a frame; where lamps need more, every frame has its share of them":
+        "Schattenkarten, die je Bild gezeichnet werden; brauchen die Lampen mehr, bekommt jedes Bild seinen Teil davon",
+    "Leave the world out of the picture; it still lights the scene":
+        "Die Welt nicht im Bild zeigen; die Szene beleuchtet sie trotzdem",
+    "Spheres where the probes are: in the light that they hold, or coloured by whether they are usable (green), moved (orange) or "
+    "inside geometry (red)":
+        "Kugeln an den Orten der Sonden: in ihrem Licht, oder gefärbt danach, ob sie brauchbar (grün), verschoben (orange) oder in "
+        "Geometrie (rot) sind",
+    "None": "Keine",
+    "Validity": "Gültigkeit",
+    "Probe Size": "Sondengröße",
+    "How large the spheres of probes are": "Wie groß die Kugeln der Sonden sind",
+    "Volume Bounds": "Grenzen der Volumen",
+    "The boxes of the probe volumes": "Die Quader der Sondenvolumen",
+    "Colours on surfaces for how far the light is off there: red is too bright, blue is too dark; what was measured last with Find "
+    "Leaks":
+        "Farben auf Flächen dafür, wie weit das Licht dort abweicht: Rot ist zu hell, Blau zu dunkel; was „Lichtlecks suchen“ "
+        "zuletzt "
+        "gemessen hat",
+    "Render": "Rendern",
+    "Frames that are averaged for a render": "Bilder, die für ein gerendertes Bild gemittelt werden",
+    "In Renders": "In gerenderten Bildern",
+    "Draw the overlays over the combined pass of renders as well":
+        "Die Überlagerungen auch über den kombinierten Durchgang gerenderter Bilder zeichnen",
+    "Show another technique right of a line through the viewport":
+        "Rechts einer Linie durch das Ansichtsfenster eine andere Technik zeigen",
+    "Other Technique": "Andere Technik",
+    "What is shown right of the line": "Was rechts der Linie gezeigt wird",
+    "Split": "Teilung",
+    "Where the line is, from the left edge of the viewport to the right":
+        "Wo die Linie ist, vom linken Rand des Ansichtsfensters zum rechten",
+    "Deliver the light of lamps and what surfaces emit": "Das Licht der Lampen liefern, und was Flächen ausstrahlen",
+    "Deliver the indirect light that surfaces reflect": "Das indirekte Licht liefern, das Flächen reflektieren",
+    "Deliver the indirect light that arrives at surfaces (in W/m²)":
+        "Das indirekte Licht liefern, das bei Flächen ankommt (in W/m²)",
+}
