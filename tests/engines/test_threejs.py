@@ -49,7 +49,8 @@ def test_files(export):
 
 
 def test_every_file_that_a_page_names_is_there(export):
-    for page in ("index.html", "conformance.html", "demo.js", "conformance/page.js", "conformance.mjs", "rtgi/RTGIProbeVolumes.js"):
+    for page in ("index.html", "demo.js", "conformance/webgl.js", "conformance/webgpu.js", "conformance.mjs",
+                 "rtgi/RTGIProbeVolumes.js", "rtgi/RTGIProbeLight.js"):
         text = (export / page).read_text()
         for name in re.findall(r"""(?:from|src=)\s*['"](\.[^'"]+)['"]""", text):
             assert ((export / page).parent / name).is_file(), f"{page} names {name}"
@@ -177,6 +178,7 @@ def test_types_fit_three(node, node_modules, install_three, export):
         (export / "node_modules" / name).symlink_to(node_modules / name, target_is_directory=True)
     (export / "use.ts").write_text("""
 import { Color, Mesh, MeshStandardMaterial, Scene, SphericalHarmonics3, Vector3 } from 'three';
+import { RTGIProbeLight } from './rtgi/RTGIProbeLight.js';
 import { RTGILightProbe, RTGIProbeLoader, RTGIProbeVolumes } from './rtgi/RTGIProbeVolumes.js';
 const scene = new Scene();
 const probes: RTGIProbeVolumes = await new RTGIProbeLoader().loadAsync('probes.json');
@@ -187,6 +189,7 @@ const e: Color = probes.irradiance(new Vector3(), new Vector3(0, 1, 0));
 const sh: SphericalHarmonics3 = probes.radiance(e && new Vector3(), light.sh);
 probes.forEachProbe((position, live, volume) => { if (live) console.log(position.x, probes.volumes[volume].count, sh); });
 probes.intensity = 2;
+scene.add(probes, new RTGIProbeLight(probes));
 // @ts-expect-error: a number is no material
 probes.apply(3);
 probes.dispose();

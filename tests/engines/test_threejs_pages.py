@@ -41,7 +41,17 @@ def cornell(tmp_path_factory):
 @pytest.mark.parametrize("release", ["three", "three-oldest"])
 def test_the_gpu_agrees(browse, install_three, export, release):
     page = browse(install_three(export, release), "conformance.html")
-    assert page["state"] == "passed" and page["shown"].count("pass  ") == 13, page
+    assert page["state"] == "passed" and page["shown"].count("pass  ") == 14, page
+    assert not [message for message in page["messages"] if message.startswith("error")], page
+
+
+@pytest.mark.parametrize(("webgpu", "device"), [(True, "on WebGPU"), (False, "on WebGL 2 in place of WebGPU")])
+def test_the_gpu_agrees_through_nodes(browse, install_three, export, webgpu, device):
+    page = browse(install_three(export), "conformance.html?webgpu", webgpu=webgpu)
+    assert page["state"] == "passed" and page["shown"].count("pass  ") == 12, page
+    if webgpu and device not in page["shown"]:
+        pytest.skip("this Chromium has no WebGPU in software; WebGL 2 took its place")
+    assert device in page["shown"], page
     assert not [message for message in page["messages"] if message.startswith("error")], page
 
 

@@ -2,6 +2,8 @@
 //
 //   node browser.mjs CHROMIUM PROFILE '{"url": ..., "width": 480, "height": 480, "screenshot": FILE, "picture": FILE}'
 //
+// Everything is drawn in software; "webgpu": true adds WebGPU to WebGL.
+//
 // "picture" receives the scene of the demo page from its camera, in linear light: float32 r, g, b rows from the bottom, twice as
 // wide and high as the window.
 
@@ -15,7 +17,8 @@ const context = await chromium.launchPersistentContext(profile, {
   headless: true,
   viewport: { width: job.width, height: job.height },
   args: ['--no-sandbox', '--disable-gpu-sandbox', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader',
-    '--disable-quic', '--no-first-run', '--disable-background-networking', '--disable-component-update', '--disable-sync'],
+    '--disable-quic', '--no-first-run', '--disable-background-networking', '--disable-component-update', '--disable-sync',
+    ...(job.webgpu ? ['--enable-unsafe-webgpu', '--use-webgpu-adapter=swiftshader'] : [])],
 });
 const page = context.pages()[0] ?? await context.newPage();
 const messages = [];

@@ -20,8 +20,9 @@ from .probes_file import write_probes
 
 _FILES = Path(__file__).parent / "export"
 _FOR_EVERY = ("README.md", "package.json", "index.html", "demo.js", "rtgi/RTGIProbeVolumes.js", "rtgi/RTGIProbeVolumes.d.ts",
-              "rtgi/lookup.js", "rtgi/shader.js")
-_FOR_CONFORMANCE = ("conformance.mjs", "conformance.html", "conformance/compare.js", "conformance/page.js")
+              "rtgi/RTGIProbeLight.js", "rtgi/RTGIProbeLight.d.ts", "rtgi/lookup.js", "rtgi/shader.js")
+_FOR_CONFORMANCE = ("conformance.mjs", "conformance.html", "conformance/compare.js", "conformance/draw.js",
+                    "conformance/webgl.js", "conformance/webgpu.js")
 _MODEL = "model.glb"
 
 

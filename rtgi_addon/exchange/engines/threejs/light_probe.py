@@ -13,5 +13,5 @@ def light_probe_case(field: ProbeField, axes: Axes) -> dict:
     hard = next(case for case in conformance.cases(field, axes) if case.name == "visibility")
     points = hard.points.astype(np.float64) @ axes.engine_from_blender / axes.scale
     kit = conformance.kit_field().with_lookup(LookupSettings(normal_weight=False, normal_bias=0.0))
-    return conformance.case("light probe", "the same points, without a normal to weigh probes by", conformance.KIT, kit, axes, points,
-                            np.random.default_rng(4)).to_json()
+    return conformance.case("light probe", "the same points, without a normal to weigh probes by", conformance.KIT, kit, axes,
+                            points, np.random.default_rng(4)).to_json()

@@ -307,7 +307,7 @@ function wrapped(row, column, tile) {
 function makeUniforms(volumes, halves, distances) {
   const flat = (values, type = Float32Array) => ({ value: type.from(volumes.flatMap(values)) });
   return {
-    rtgiProbes: { value: listTexture(halves, COEFFICIENTS, RGBAFormat, HalfFloatType, 'RGBA16F') },
+    rtgiProbes: { value: listTexture(halves, COEFFICIENTS, RGBAFormat, HalfFloatType) },
     rtgiDistances: { value: listTexture(distances, 1, RGBAIntegerFormat, UnsignedShortType, 'RGBA16UI') },
     rtgiFromWorld: { value: new Matrix4() },
     rtgiIntensity: { value: 1 },
@@ -321,14 +321,14 @@ function makeUniforms(volumes, halves, distances) {
 }
 
 // `values` (RGBA texels) folded into a texture near a square, an item's `texels` side by side.
-function listTexture(values, texels, format, type, internalFormat) {
+function listTexture(values, texels, format, type, internalFormat = null) {
   const items = values.length / (4 * texels);
   const perRow = Math.max(Math.min(Math.ceil(Math.sqrt(items / texels)), items), 1);
   const width = perRow * texels, height = Math.ceil(items / perRow);
   const padded = new Uint16Array(4 * width * height);
   padded.set(values);
   const texture = new DataTexture(padded, width, height, format, type);
-  // Not every release finds the one of integers by itself.
+  // Old releases do not find the one of integers by themselves.
   texture.internalFormat = internalFormat;
   texture.magFilter = texture.minFilter = NearestFilter;
   texture.needsUpdate = true;

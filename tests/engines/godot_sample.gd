@@ -1,0 +1,22 @@
+extends SceneTree
+## Draws the sample scene through the model's camera, without the ball, into a scene-linear EXR: after `--`, the file and the size.
+
+
+func _initialize() -> void:
+	var words := OS.get_cmdline_user_args()
+	var size := int(words[1])
+	var viewport := SubViewport.new()
+	viewport.size = Vector2i(size, size)
+	viewport.own_world_3d = true
+	viewport.use_hdr_2d = true
+	viewport.msaa_3d = Viewport.MSAA_4X
+	viewport.render_target_update_mode = SubViewport.UPDATE_ALWAYS
+	root.add_child(viewport)
+	var scene: Node = (load("res://sample.tscn") as PackedScene).instantiate()
+	viewport.add_child(scene)
+	scene.get_node("Ball").visible = words.size() > 2
+	for frame in 90 if words.size() > 2 else 5:
+		await RenderingServer.frame_post_draw
+	print("lamps ", scene.find_children("*", "Light3D", true, false).size(), ", camera ", viewport.get_camera_3d().name)
+	viewport.get_texture().get_image().save_exr(words[0])
+	quit()

@@ -1,0 +1,161 @@
+"""The export to Godot in a real Godot: imported without a word, equal to our own lookup at every point, beside our own picture.
+
+RTGI_GODOT holds the command that starts a Godot 4.6, with a display for the tests that draw, for example
+`python tools/debian_tree.py run TREE --bind /tmp -- xvfb-run -a godot`.
+"""
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rtgi_addon.exchange import engines
+
+ROOT = Path(__file__).resolve().parents[2]
+CORNELL = ROOT / "sample_blends/cornell_box.blend"
+SIZE = 240
+
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(
+    "RTGI_GODOT" not in os.environ, reason="needs a real Godot: RTGI_GODOT is the command that starts it")]
+
+
+def godot(project, *words):
+    """Exit code and everything that Godot says about ``project``."""
+    command = [*shlex.split(os.environ["RTGI_GODOT"]), "--audio-driver", "Dummy", "--path", str(project), *map(str, words)]
+    ran = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300, check=False)
+    return ran.returncode, ran.stdout + ran.stderr
+
+
+def complaints(said):
+    """What Godot complains of in what it ``said``, but for what a machine without a sound card or a display does."""
+    lines = [line for line in said.splitlines() if re.search(r"\b(ERROR|WARNING)\b", line)]
+    return [line for line in lines if not re.search(r"V-Sync|vsync|ALSA|audio|dbus|libdecor|RADV|MESA", line, re.IGNORECASE)]
+
+
+def imported(folder):
+    """``folder`` after Godot has imported it."""
+    code, said = godot(folder, "--headless", "--import")
+    assert code == 0 and not complaints(said), said
+    return folder
+
+
+@pytest.fixture(scope="module")
+def project(kit_bundle, tmp_path_factory):
+    """The kit exported and imported."""
+    return imported(engines.get("godot").export(kit_bundle, tmp_path_factory.mktemp("godot") / "kit").out)
+
+
+@pytest.fixture(scope="module")
+def cornell(tmp_path_factory):
+    """The Cornell box baked with direct light and exported with its model, imported: the bundle and the project."""
+    bpy = pytest.importorskip("bpy", reason="needs Blender or its Python module")
+    if not bpy.app.module:
+        pytest.skip("the module's door needs the module: this is a real Blender")
+    folder = tmp_path_factory.mktemp("cornell")
+    rtgi("bake", "--direct", "--rays", 256, "--out", folder / "bundle")
+    rtgi("export", folder / "bundle", "--engine", "godot", "--out", folder / "project")
+    return folder / "bundle", imported(folder / "project")
+
+
+def rtgi(*words):
+    """Run a subcommand on the Cornell box."""
+    ran = subprocess.run([sys.executable, "-m", "rtgi_addon", CORNELL, *map(str, words)], cwd=ROOT, capture_output=True,
+                         text=True, timeout=300, check=False)
+    assert ran.returncode == 0, ran.stderr
+
+
+def conformance(project, *words):
+    return godot(project, *words, "--script", "conformance/conformance.gd")
+
+
+def drawing(said):
+    """Skip where Godot found no driver to draw with."""
+    if re.search(r"no suitable|Unable to (create|open)|not (support|available)|Can't (create|open)", said, re.IGNORECASE):
+        pytest.skip(f"this Godot cannot draw here: {complaints(said)[:1]}")
+
+
+def test_scripts_agree_without_a_display(project):
+    code, said = conformance(project, "--headless")
+    assert code == 0 and said.count("PASS ") == 8 and "FAIL" not in said, said
+    assert "SKIP the shader" in said and not complaints(said), said
+
+
+@pytest.mark.parametrize("options", [("--rendering-driver", "vulkan"), ("--rendering-method", "mobile"),
+                                     ("--rendering-driver", "opengl3")], ids=["forward+", "mobile", "compatibility"])
+def test_shaders_and_dynamic_objects_agree(project, options):
+    code, said = conformance(project, *options)
+    drawing(said)
+    assert code == 0 and said.count("PASS ") == 18 and "FAIL" not in said, said
+    assert "PASS dynamic objects:" in said and "PASS visibility, shader, moved:" in said and not complaints(said), said
+
+
+@pytest.mark.parametrize(("file", "text", "wrong", "failing"), [
+    ("kit/irradiance.gdshaderinc", "behind > 0.0 ? bound * bound * bound : 1.0", "1.0", "visibility, shader"),
+    ("kit/irradiance.gdshaderinc", "direction.x, -direction.z", "direction.x, direction.z", "visibility, shader"),
+    ("kit/irradiance.gdshaderinc", "0.42904276", "-0.42904276", "known content, shader"),
+    ("kit/light_data.tres", '"sh": PackedColorArray(0', '"sh": PackedColorArray(9', "dynamic objects"),
+], ids=["chebyshev", "tiles", "last band", "light data"])
+def test_the_kit_finds_damage(project, file, text, wrong, failing):
+    path = project / "conformance" / file
+    whole = path.read_text()
+    assert text in whole or file.endswith(".tres")
+    damaged = whole.replace(text, wrong) if text in whole else re.sub(r'("sh": PackedColorArray\()[^,]+', r"\g<1>90.0", whole)
+    try:
+        path.write_text(damaged)
+        code, said = conformance(project, "--rendering-driver", "vulkan")
+    finally:
+        path.write_text(whole)
+    drawing(said)
+    assert code == 1 and f"FAIL {failing}" in said and "PASS bundle, script" in said, said
+
+
+def test_the_editor_opens_the_sample(cornell):
+    code, said = godot(cornell[1], "--headless", "--editor", "sample.tscn", "--quit-after", 30)
+    assert code == 0 and not complaints(said), said
+
+
+def picture(project, path, *words):
+    """The sample scene (SIZE, SIZE, 3) float32 as Godot draws it, scene-linear."""
+    from rtgi_addon.exchange.exr_codec import decode
+    code, said = godot(project, "--rendering-driver", "vulkan", "--script", Path(__file__).parent / "godot_sample.gd", "--", path,
+                       SIZE, *words)
+    drawing(said)
+    assert code == 0 and not complaints(said), said
+    planes, _ = decode(path.read_bytes())
+    return np.stack([planes[name] for name in "RGB"], axis=-1).astype(np.float32), said
+
+
+def test_the_sample_beside_our_picture(gpu_device, cornell, tmp_path):
+    """Mean relative difference in linear light of the Cornell box in its probes' light, from its camera: edges included."""
+    from rtgi_addon.exchange.exr import read_exr
+    bundle, project = cornell
+    theirs, said = picture(project, tmp_path / "godot.exr")
+    assert "lamps 0, camera Camera" in said, said
+    rtgi("render", "--bundle", bundle, "--pass", "indirect", "--samples", 8, "--scale", SIZE / 480, "--out", tmp_path / "ours.exr")
+    planes, _ = read_exr(tmp_path / "ours.exr")
+    ours = np.stack([planes[name] for name in "RGB"], axis=-1)
+    difference = np.abs(theirs - ours)
+    assert difference.mean() < 0.015 * ours.mean()
+    # Away from the edges of things nothing but the halves is left.
+    assert np.median(difference[ours > 0]) < 1e-3 * ours.mean()
+    assert abs(theirs.mean() / ours.mean() - 1.0) < 5e-3
+
+
+def test_the_ball_is_lit_and_follows(cornell, tmp_path):
+    """A dynamic object in the sample: there, not black, and no brighter than the room's light."""
+    _, project = cornell
+    without, _ = picture(project, tmp_path / "without.exr")
+    found, _ = picture(project, tmp_path / "with.exr", "ball")
+    changed = np.abs(found - without).max(axis=-1) > 0.02
+    assert 0.002 < changed.mean() < 0.1
+    assert 0.05 < np.median(found[changed]) < 3.0 * without.max()
+
+
+def test_without_a_model_there_are_balls(project, tmp_path):
+    found, _ = picture(project, tmp_path / "balls.exr")
+    assert np.isfinite(found).all() and (found > 0.01).mean() > 0.05
