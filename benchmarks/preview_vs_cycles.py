@@ -59,6 +59,8 @@ LAMPS = "rtgi_lamps"
 SEEN_ITSELF = ("Emit", "Emission", "Env", "Environment")
 # The grid of pixels at which the path reference says what the field itself is off by.
 FIELD_GRID, FIELD_NOISE, FIELD_PATHS = (24, 14), 0.015, 6_000_000
+# Rays of each of EEVEE's samples: a quarter of its default, whose noise is far below its leaks.
+EEVEE_RAYS = 512
 # Side [pixels] of the blocks in which Cycles' noise is averaged out.
 BLOCK = 8
 
@@ -150,6 +152,7 @@ def render_eevee(name: str, size, samples: int) -> np.ndarray:
         probe.scale = [scale * (count + 2) / count for scale, count in zip(probe.scale, counts, strict=True)]
         for axis, count in zip("xyz", counts, strict=True):
             setattr(probe.data, f"resolution_{axis}", count + 2)
+        probe.data.bake_samples = EEVEE_RAYS
     bpy.context.view_layer.update()
     bpy.ops.object.lightprobe_cache_bake(subset="ALL")
     with tempfile.TemporaryDirectory() as folder:
