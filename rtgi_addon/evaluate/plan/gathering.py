@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ...progress import Progress
-from ...techniques.probes.adaptive import FIRST_ROUND
 from ...techniques.probes.bake import BLOCK_RAYS, ITEM_RAYS, mean_distances
 from ...techniques.probes.gather import GROUP, Gathered, Gatherer, Item
 from ...techniques.probes.placement import Placement
@@ -22,8 +21,8 @@ from ...transport.vectors import dot
 from ..receivers import Receivers
 from ..references import Truth
 
-# Rays of a probe: what a bake traces at the least.
-PROBE_RAYS = FIRST_ROUND
+# Rays of a probe: fewer than any bake traces, since their noise is taken out.
+PROBE_RAYS = 128
 # Variance of a mean over both halves of a sequence, relative to the squared difference of the halves' means. Independent halves
 # would give 0.25; those of a scrambled Sobol sequence complement each other: 0.12 to 0.17 over four seeds on four samples.
 HALVES = 0.14

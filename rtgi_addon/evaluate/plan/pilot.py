@@ -23,7 +23,7 @@ from ...transport.context import LightContext
 from ...transport.ray_counter import count_rays
 from ..metrics import Figure
 from ..receivers import Receivers
-from .gathering import HALVES, ProbeLight, light_at_probes, light_at_receivers
+from .gathering import HALVES, PROBE_RAYS, ProbeLight, light_at_probes, light_at_receivers
 from .sample import NORMALS_PER_POINT, Sample
 from .sparse import SparseField, SparseLookup, positions_of, probes_read
 
@@ -99,7 +99,7 @@ class Reading:
         if error is not None:
             probes = np.flatnonzero(self.model.rays > 0)
             ratio = np.zeros(len(self.model.rays))
-            ratio[probes] = (FIRST_ROUND / self.rays(error)) ** (2 * SLOPE)
+            ratio[probes] = (PROBE_RAYS / self.rays(error)) ** (2 * SLOPE)
             forgiven = forgiven - self.variance * (self.mixed @ ratio)[:, None]
             allowance = CACHE_SHARE * error
         figure = self.pilot.sample.error(estimate, self.pilot.truth, forgiven)

@@ -28,6 +28,8 @@ NEARLY, CANDIDATES = 1.1, 3
 # Tries at a spacing; each goes to where the last one says that the target is met, and a little past it, and none is worth a change
 # smaller than this.
 TRIES, OVERSHOOT, NO_STEP = 5, 1.01, 0.95
+# Another exchange of rays for probes is tried where it should cost less than this share.
+WORTH_TRYING = 0.9
 # How much coarser an axis is made to see what the light along it does, and the most (volume, axis) pairs that are told apart.
 COARSENED, MOST_AXES = 1.5, 12
 # Each axis is held to cause at least this share of what it would if all caused the same.
@@ -92,6 +94,7 @@ class Search:
         reading = self._settle(factor, order, ray_error, exponent)
         if reading is None:
             return self._best(tuple(self._pilot.readings), readings, rate)
+        reading, ray_error = self._exchange(reading, order, ray_error, exponent)
         reading = self._shape(reading, order, ray_error, exponent)
         return Found(reading, order, ray_error, reading.error(order, ray_error), True, rate, readings)
 
@@ -192,6 +195,23 @@ class Search:
                     break
                 factor = following
         return known
+
+    def _exchange(self, reading: Reading, order: int, ray_error: float, rate: float) -> tuple[Reading, float]:
+        """``reading`` and its ray setting, or another that takes fewer rays in all: a finer lattice with fewer rays a probe, or a
+        coarser one with more, now that the whole error is known at one of them."""
+        def cost(other: float) -> tuple[float, float]:
+            scale = (upper(reading.error(order, other)) / self._target) ** (1.0 / rate)
+            return self._prices.rays(reading, other, scale**3 * reading.lattice_points), scale
+
+        best = min(RAY_ERRORS, key=lambda other: cost(other)[0])
+        spent = self._prices.rays(reading, ray_error)
+        if best == ray_error or cost(best)[0] > WORTH_TRYING * spent:
+            return reading, ray_error
+        factor = (reading.lattice_points / sum(np.prod(own) for own in self._files)) ** (1.0 / 3.0)
+        other = self._settle(factor * cost(best)[1] * OVERSHOOT, order, best, rate)
+        if other is None or self._prices.rays(other, best) > spent:
+            return reading, ray_error
+        return other, best
 
     def _shape(self, base: Reading, order: int, ray_error: float, rate: float) -> Reading:
         """``base`` or a cheaper lattice with more probes along axes where the light changes and fewer where it does not."""
