@@ -34,6 +34,7 @@ charts: setup        ## chart speed against accuracy of every sample into benchm
 
 bench: setup         ## measure again what benchmarks/README.md says
 	$(PYTHON) benchmarks/ray_rate.py
+	$(PYTHON) benchmarks/without_embree.py
 	$(PYTHON) benchmarks/bake_vs_cycles.py
 	$(PYTHON) benchmarks/relight.py
 	$(PYTHON) benchmarks/scale.py

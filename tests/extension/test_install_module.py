@@ -1,6 +1,6 @@
 """The zip in Blender's Python module: installed, enabled, baked with, rendered with, disabled, uninstalled, without a network.
 
-RTGI_MODULES names more Pythons with a bpy module each, separated as in PATH: .ci/run makes those of every supported version.
+RTGI_MODULES names other Pythons with a bpy module each, separated as in PATH: .ci/run makes those of every supported version.
 """
 
 import json
@@ -14,7 +14,7 @@ from extension_zip import PLATFORM, REPOSITORY
 
 pytestmark = pytest.mark.slow
 
-PYTHONS = [sys.executable, *filter(None, os.environ.get("RTGI_MODULES", "").split(os.pathsep))]
+PYTHONS = [*filter(None, os.environ.get("RTGI_MODULES", "").split(os.pathsep))] or [sys.executable]
 # Blender's own note of which extensions fit it.
 BLENDERS_OWN = {"extensions/.cache/compat.dat"}
 
