@@ -7,10 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rtgi_addon.exchange import engines
-from rtgi_addon.exchange.bundle import read_bundle
-from rtgi_addon.exchange.engines import ExportSettings
-
 pytestmark = pytest.mark.slow
 ROOT = Path(__file__).resolve().parents[2]
 CORNELL = ROOT / "sample_blends/cornell_box.blend"
@@ -26,16 +22,14 @@ def rtgi(*words):
 
 @pytest.fixture(scope="module")
 def cornell(tmp_path_factory):
-    """The Cornell box baked with direct light, and as a model: the bundle and the .glb."""
+    """The Cornell box baked with direct light, and exported with its model: the bundle and the export."""
     bpy = pytest.importorskip("bpy", reason="needs Blender or its Python module")
     if not bpy.app.module:
         pytest.skip("the module's door needs the module: this is a real Blender")
     folder = tmp_path_factory.mktemp("cornell")
     rtgi("bake", "--direct", "--out", folder / "bundle", "--rays", 256)
-    bpy.ops.wm.open_mainfile(filepath=str(CORNELL))
-    bpy.ops.export_scene.gltf(filepath=str(folder / "model.glb"), export_format="GLB", export_cameras=True, export_lights=True,
-                              export_import_convert_lighting_mode="COMPAT")
-    return folder / "bundle", folder / "model.glb"
+    rtgi("export", folder / "bundle", "--engine", "threejs", "--out", folder / "export")
+    return folder / "bundle", folder / "export"
 
 
 @pytest.mark.parametrize("release", ["three", "three-oldest"])
@@ -81,8 +75,7 @@ def test_without_a_model_balls_show_the_probes(browse, install_three, export, tm
 def test_the_demo_beside_our_picture(gpu_device, cornell, browse, install_three, tmp_path):
     """Mean relative difference in linear light of the Cornell box in its probes' light, from its camera: edges included."""
     from rtgi_addon.exchange.exr import read_exr
-    bundle, model = cornell
-    export = engines.get("threejs").export(read_bundle(bundle), tmp_path / "export", ExportSettings(model=model)).out
+    bundle, export = cornell
     page = browse(install_three(export), "index.html", SIZE, SIZE, picture=str(tmp_path / "three.raw"),
                   screenshot=str(tmp_path / "three.png"))
     assert page["state"] == "ready" and not [text for text in page["messages"] if text.startswith("error")], page

@@ -144,3 +144,15 @@ test('scales all light by its intensity', () => {
   light.sh.coefficients.forEach((c, i) => assert.ok(c.distanceTo(before.coefficients[i].multiplyScalar(0.5)) < 1e-9));
   assert.equal(light.intensity, 2);
 });
+
+test('goes along when a scene is cloned', () => {
+  const probes = parse(), scene = new THREE.Scene(), light = new RTGILightProbe(probes, 2).update(new THREE.Vector3());
+  probes.position.set(1, 2, 3);
+  probes.intensity = 0.5;
+  const [copy, lightCopy] = scene.add(probes, light).clone().children;
+  const point = new THREE.Vector3(1, 2, 3), up = new THREE.Vector3(0, 1, 0);
+  [probes, copy].forEach((each) => each.updateMatrixWorld());
+  assert.deepEqual(copy.irradiance(point, up).toArray(), probes.irradiance(point, up).toArray());
+  assert.ok(copy !== probes && copy.uniforms.rtgiProbes.value !== probes.uniforms.rtgiProbes.value);
+  assert.ok(lightCopy.probes === probes && lightCopy.intensity === 2 && lightCopy.sh.equals(light.sh));
+});

@@ -32,6 +32,10 @@ export class RTGIProbeLight extends Light {
     this.distances.needsUpdate = true;
   }
 
+  clone(recursive) {
+    return new RTGIProbeLight(this.probes).copy(this, recursive);
+  }
+
   // Free this light's texture; the probes free theirs.
   dispose() {
     super.dispose();

@@ -81,6 +81,7 @@ export class RTGIProbeVolumes extends Object3D {
   // `description` is the parsed .json, `buffer` the ArrayBuffer of the .bin; RTGIProbeLoader checks both.
   constructor(description, buffer) {
     super();
+    this._source = [description, buffer];
     this.isRTGIProbeVolumes = true;
     this.type = 'RTGIProbeVolumes';
     this.name = description.scene;
@@ -172,6 +173,13 @@ export class RTGIProbeVolumes extends Object3D {
     this._updateUniforms();
   }
 
+  // The same probes, which light no material yet.
+  clone(recursive) {
+    const copy = new RTGIProbeVolumes(...this._source).copy(this, recursive);
+    copy.intensity = this.intensity;
+    return copy;
+  }
+
   // Free the textures, and give materials back as they were.
   dispose() {
     [...this._materials].forEach((material) => this._unhook(material));
@@ -251,6 +259,10 @@ export class RTGILightProbe extends LightProbe {
   update(position) {
     this.probes.radiance(position, this.sh);
     return this;
+  }
+
+  clone(recursive) {
+    return new RTGILightProbe(this.probes).copy(this, recursive);
   }
 }
 
