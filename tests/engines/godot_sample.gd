@@ -1,5 +1,5 @@
 extends SceneTree
-## Draws the sample scene through the model's camera, without the ball, into a scene-linear EXR: after `--`, the file and the size.
+## Draws the sample scene in scene-linear RGB of float32, row after row: after `--`, the file, the side, and `ball` to show the ball.
 
 
 func _initialize() -> void:
@@ -18,5 +18,7 @@ func _initialize() -> void:
 	for frame in 90 if words.size() > 2 else 5:
 		await RenderingServer.frame_post_draw
 	print("lamps ", scene.find_children("*", "Light3D", true, false).size(), ", camera ", viewport.get_camera_3d().name)
-	viewport.get_texture().get_image().save_exr(words[0])
+	var image := viewport.get_texture().get_image()
+	image.convert(Image.FORMAT_RGBF)
+	FileAccess.open(words[0], FileAccess.WRITE).store_buffer(image.get_data())
 	quit()
