@@ -1,6 +1,7 @@
 """How far the preview's pictures are from Cycles: the samples through their own cameras, bake included.
 
     python benchmarks/preview_vs_cycles.py [samples...] [--density 1 3] [--size 640 360] [--cycles-samples 256] [--no-eevee]
+        [--no-field]
     blender -b --python benchmarks/preview_vs_cycles.py -- [the same]
 
 Cycles renders every picture twice with other seeds, hidden lamps, the same pixel filter and nothing that trades bias for speed.
@@ -87,9 +88,10 @@ def field_truth(scene: Scene, threads: int | None) -> tuple[Receivers, Truth]:
     return receivers, PathReference(LightContext(scene, threads), FIELD_NOISE, FIELD_PATHS).irradiance(receivers)
 
 
-def render_rtgi(name: str, size, density: float, samples: int, threads: int | None, held: tuple | None) -> dict:
-    """Passes (h, w, 3), row 0 at the top, which pixels show a surface, seconds, and the difference of the field to ``held``
-    (what ``field_truth`` returns, made here for None)."""
+def render_rtgi(name: str, size, density: float, samples: int, threads: int | None, held: tuple | None,
+                measured: bool = True) -> dict:
+    """Passes (h, w, 3), row 0 at the top, which pixels show a surface, seconds, and if ``measured`` the difference of the field to
+    ``held`` (what ``field_truth`` returns, made here for None)."""
     from rtgi_addon.preview.camera_view import CameraView
     from rtgi_addon.preview.renderer import PreviewRenderer
     open_sample(name, size, density)
@@ -104,9 +106,11 @@ def render_rtgi(name: str, size, density: float, samples: int, threads: int | No
     found["seen"] = np.flipud(renderer.image("object"))[..., 0] > 0.5
     drawn = time.perf_counter()
     renderer.close()
-    receivers, truth = held = held or field_truth(scene, threads)
-    off = np.abs(field.irradiance(receivers.points, receivers.normals) - truth.mean).mean()
-    off = float(off / truth.mean.mean()) if truth.mean.size and truth.mean.mean() > 0 else 0.0
+    off = None
+    if measured:
+        receivers, truth = held = held or field_truth(scene, threads)
+        off = np.abs(field.irradiance(receivers.points, receivers.normals) - truth.mean).mean()
+        off = float(off / truth.mean.mean()) if truth.mean.size and truth.mean.mean() > 0 else 0.0
     return {**found, "held": held, "bake_seconds": baked - started, "draw_seconds": drawn - baked, "field": off,
             "probes": sum(grid.sh[..., 0, 0].size for grid in field.grids())}
 
@@ -251,7 +255,7 @@ def compare(name: str, options, say) -> tuple[list[dict], list]:
                                                options.again)["combined"]
     results, held = [], None
     for density in options.density:
-        found = render_rtgi(name, size, density, options.samples, options.threads, held)
+        found = render_rtgi(name, size, density, options.samples, options.threads, held, not options.no_field)
         seen, held = found["seen"], found["held"]
         results.append({"sample": name, "density": density, "size": size, "probes": found["probes"], "field": found["field"],
                         "bake_seconds": found["bake_seconds"], "draw_seconds": found["draw_seconds"],
@@ -299,6 +303,7 @@ def main() -> int:
     parser.add_argument("--eevee-samples", type=int, default=16)
     parser.add_argument("--again", action="store_true")
     parser.add_argument("--no-eevee", action="store_true")
+    parser.add_argument("--no-field", action="store_true", help="without the path reference, which can take longer than the rest")
     parser.add_argument("--overview", type=Path)
     after = sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else sys.argv[1:]
     options = parser.parse_args(after)
