@@ -90,7 +90,10 @@ class PlannedBake:
 
     def to_json(self) -> dict:
         """The bake's values, with the plan's and the check's beside them."""
-        check = None if self.check is None else {**asdict(self.check), "within": self.check.within, "confidence": CONFIDENCE}
+        check = None
+        if self.check is not None:
+            figures = {name: getattr(self.check, name)._asdict() for name in ("predicted", "error")}
+            check = {**asdict(self.check), **figures, "within": self.check.within, "confidence": CONFIDENCE}
         return {**self.bake.to_json(), "plan": plan_json(self.plan), "check": plain(check)}
 
     def to_text(self) -> str:

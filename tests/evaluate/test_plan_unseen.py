@@ -67,7 +67,8 @@ def test_probes_that_nobody_wants_get_no_rays_and_hold_their_neighbours_light():
 
     def bake(mask):
         volume = replace(scene.volumes[0], wanted=mask)
-        return probes.bake(replace(scene, volumes=(volume,)), probes.Settings(rays=64), np.random.default_rng(0), Progress(), threads=1)
+        return probes.bake(replace(scene, volumes=(volume,)), probes.Settings(rays=64), np.random.default_rng(0), Progress(),
+                           threads=1)
 
     whole, part = bake(None), bake(wanted)
     grid = part.grids()[0]

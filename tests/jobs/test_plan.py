@@ -45,8 +45,8 @@ def test_a_planned_bake_ships_what_was_planned_and_is_checked(tmp_path, monkeypa
     assert any("planned: " in note for note in json.loads((tmp_path / "bundle/bake.json").read_text())["notes"])
     check = done.check
     assert check.points == 64 and check.rays > 0 and check.seconds > 0 and check.within
-    assert check.error.value == pytest.approx(check.predicted.value, abs=4 * np.hypot(*(max(figure.standard_error, 0.005)
-                                                                                       for figure in (check.error, check.predicted))))
+    spread = np.hypot(*(max(figure.standard_error, 0.005) for figure in (check.error, check.predicted)))
+    assert check.error.value == pytest.approx(check.predicted.value, abs=4 * spread)
     text, data = done.to_text(), json.loads(json.dumps(done.to_json()))
     assert "found at 64 surface points" in text and "planned: " not in text and "s predicted" in text
     assert data["check"]["within"] is True and data["plan"]["met"] and data["technique"] == "probes"
