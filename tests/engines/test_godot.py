@@ -106,7 +106,8 @@ def replacing(text, wrong):
 
 def turned_light_data(whole):
     """Every coefficient one place on."""
-    return re.sub(r'("sh": PackedColorArray\()(.*)((?:, [^,)]+){4})\)', lambda found: f"{found[1]}{found[3][2:]}, {found[2]})", whole)
+    return re.sub(r'("sh": PackedColorArray\()(.*)((?:, [^,)]+){4})\)',
+                  lambda found: f"{found[1]}{found[3][2:]}, {found[2]})", whole)
 
 
 @pytest.mark.parametrize(("file", "damage", "failing"), [
