@@ -82,18 +82,18 @@ class RTGI_OT_export(ModalJob, bpy.types.Operator):
             bundle, engine = output_folder(context.scene.rtgi.output), settings.engine
             folder = _target_folder(settings.folder)
             engines.get(engine).check_target(folder)
-            model = None
+            model, notes = None, ()
             if settings.model:
                 exports.folder = TemporaryDirectory(prefix="rtgi")
                 model = Path(exports.folder.name) / "model.glb"
-                export_model(model)
+                notes = export_model(model)
         except BakeError as error:
             exports.forget_model()
             self.report({"ERROR"}, sentence(str(error)))
             return False
 
         def write(progress: Progress):
-            return export_bundle(bundle, engine, folder, model=model, progress=progress)
+            return export_bundle(bundle, engine, folder, model=model, model_notes=notes, progress=progress)
 
         exports.worker = BakeWorker(write, on_report)
         return True

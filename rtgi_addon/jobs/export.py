@@ -1,5 +1,6 @@
 """From a bundle to an engine's project folder."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from ..errors import BakeError, UsageError
@@ -13,10 +14,11 @@ _GLB_MAGIC = b"glTF"
 _READ_SHARE = 0.2
 
 
-def export_bundle(bundle, engine: str, out, *, model=None, conformance: bool = True,
+def export_bundle(bundle, engine: str, out, *, model=None, conformance: bool = True, model_notes=(),
                   progress: Progress | None = None) -> ExportReport:
     """Export the bundle at path ``bundle`` to ``out`` for the engine called ``engine``, ``model`` (a .glb) in its sample scene.
 
+    ``model_notes`` say what the model lacks, which shows unless the bundle holds the lamps' light itself.
     Raises UsageError for an unknown engine, BakeError for a bundle, model or folder that will not do, Cancelled; an earlier
     export at ``out`` then stays as it was.
     """
@@ -27,7 +29,8 @@ def export_bundle(bundle, engine: str, out, *, model=None, conformance: bool = T
     target.check_target(out)
     progress.step(0.0, "Reading the bundle")
     content = read_bundle(bundle)
-    return target.export(content, out, settings, progress.span(_READ_SHARE, 1.0))
+    report = target.export(content, out, settings, progress.span(_READ_SHARE, 1.0))
+    return report if content.field.includes_direct else replace(report, notes=(*report.notes, *model_notes))
 
 
 def _checked_model(model) -> Path:

@@ -75,6 +75,20 @@ def test_a_relative_folder_of_an_unsaved_file_is_refused(registered):
         bpy.ops.rtgi.export()
 
 
+def test_area_lamps_are_missed_by_name_unless_their_light_is_baked(registered):
+    from rtgi_addon.jobs.export import export_bundle
+    bpy.ops.object.light_add(type="AREA", location=(0.0, 0.0, 3.0))
+    bpy.context.object.name = "Window"
+    from rtgi_addon.blender.model import export_model
+    notes = export_model(registered / "model.glb")
+    assert notes == ("glTF has no area lamps: the model lacks Window",)
+    report = export_bundle(registered / "bake", "godot", registered / "out", model=registered / "model.glb", model_notes=notes)
+    assert report.notes == notes
+    manifest = json.loads((registered / "bake/bake.json").read_text())
+    (registered / "bake/bake.json").write_text(json.dumps({**manifest, "includes_direct": True}))
+    assert export_bundle(registered / "bake", "godot", registered / "out", model_notes=notes).notes == ()
+
+
 def test_without_a_bundle_there_is_no_button(registered):
     bpy.context.scene.rtgi.output = str(registered / "nowhere")
     assert not bpy.ops.rtgi.export.poll()

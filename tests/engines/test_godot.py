@@ -10,12 +10,14 @@ import shlex
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rtgi_addon.exchange import engines
+from rtgi_addon.exchange.engines import ExportSettings
 
 ROOT = Path(__file__).resolve().parents[2]
 CORNELL = ROOT / "sample_blends/cornell_box.blend"
@@ -156,6 +158,35 @@ def test_the_sample_beside_our_picture(gpu_device, cornell, tmp_path):
     # Away from the edges of things nothing but the halves is left.
     assert np.median(difference[ours > 0]) < 1e-3 * ours.mean()
     assert abs(theirs.mean() / ours.mean() - 1.0) < 5e-3
+
+
+@pytest.mark.parametrize(("kind", "power", "irradiance"), [
+    ("POINT", 100.0, 100.0 / (4 * np.pi * 2.0**2)), ("SPOT", 100.0, 100.0 / (4 * np.pi * 2.0**2)), ("SUN", 2.0, 2.0)])
+def test_the_models_lamps_give_what_they_give_in_blender(empty_blend, kit_bundle, tmp_path, kind, power, irradiance):
+    """A grey floor two metres below a lamp, and probes without light, which say that lamps are not in them."""
+    bpy = empty_blend
+    from rtgi_addon.blender.model import export_model
+    bpy.ops.mesh.primitive_plane_add(size=8)
+    material = bpy.data.materials.new("Grey")
+    if material.node_tree is None:  # Blender 4.5
+        material.use_nodes = True
+    material.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = (0.5, 0.5, 0.5, 1.0)
+    material.node_tree.nodes["Principled BSDF"].inputs["Roughness"].default_value = 1.0
+    bpy.context.object.data.materials.append(material)
+    bpy.ops.object.light_add(type=kind, location=(0, 0, 2))
+    bpy.context.object.data.energy = power
+    if kind == "SPOT":
+        bpy.context.object.data.spot_size = np.radians(90.0)
+    bpy.ops.object.camera_add(location=(0, 0, 1.8), rotation=(0, 0, 0))
+    bpy.context.scene.camera = bpy.context.object
+    assert export_model(tmp_path / "model.glb") == ()
+    dark = replace(kit_bundle, grids=tuple(replace(grid, sh=0.0 * grid.sh) for grid in kit_bundle.grids[:1]))
+    settings = ExportSettings(model=str(tmp_path / "model.glb"), conformance=False)
+    project = imported(engines.get("godot").export(dark, tmp_path / "project", settings).out)
+    found, said = picture(project, tmp_path / "floor.raw", size=64)
+    assert "lamps 1" in said
+    # Godot adds a dielectric's gloss, one or two hundredths at this roughness.
+    assert found[32, 32] == pytest.approx(np.full(3, 0.5 / np.pi * irradiance), rel=0.04)
 
 
 def test_the_ball_is_lit_and_follows(cornell, tmp_path):

@@ -24,8 +24,8 @@ def _check(arguments: argparse.Namespace) -> None:
 
 
 def _run(arguments: argparse.Namespace, session: Session) -> ExportReport:
-    def export(model, progress) -> ExportReport:
-        return export_bundle(arguments.bundle, arguments.engine, arguments.out, model=model,
+    def export(model, progress, notes=()) -> ExportReport:
+        return export_bundle(arguments.bundle, arguments.engine, arguments.out, model=model, model_notes=notes,
                              conformance=not arguments.no_conformance, progress=progress)
 
     if arguments.model is not None or not session.has_file:
@@ -37,8 +37,8 @@ def _run(arguments: argparse.Namespace, session: Session) -> ExportReport:
     session.open_file()
     with TemporaryDirectory(prefix="rtgi") as folder:
         model = Path(folder) / "model.glb"
-        export_model(model)
-        return export(model, session.progress.span(EXTRACT_SHARE, 1.0))
+        notes = export_model(model)
+        return export(model, session.progress.span(EXTRACT_SHARE, 1.0), notes)
 
 
 SUBCOMMAND = Subcommand("export", "write a bundle as an engine's textures, shaders and sample scene", True, _add_arguments, _run,

@@ -14,10 +14,11 @@ func _ready() -> void:
 	if ResourceLoader.exists(MODEL):
 		var model: Node = (load(MODEL) as PackedScene).instantiate()
 		add_child(model)
-		# The probes hold what such lamps give.
-		if index["includes_direct"]:
-			for lamp in model.find_children("*", "Light3D", true, false):
-				lamp.queue_free()
+		for lamp: Light3D in model.find_children("*", "Light3D", true, false):
+			if index["includes_direct"]:
+				lamp.queue_free()  # the probes hold what such lamps give
+			else:
+				_set_up(lamp)
 		for camera: Camera3D in model.find_children("*", "Camera3D", true, false):
 			camera.make_current()
 			break
@@ -40,6 +41,16 @@ func _process(_delta: float) -> void:
 		var time := Time.get_ticks_msec() / 2000.0
 		var leg := int(time) % _path.size()
 		$Ball.position = _path[leg].lerp(_path[(leg + 1) % _path.size()], smoothstep(0.0, 1.0, fposmod(time, 1.0)))
+
+
+## glTF's watts per steradian and per square metre, as Blender's exporter writes them, in Godot's unit; with shadows.
+func _set_up(lamp: Light3D) -> void:
+	lamp.light_energy /= PI
+	lamp.shadow_enabled = true
+	if lamp is OmniLight3D or lamp is SpotLight3D:
+		# glTF lamps have no end, and shadows are as coarse as the range is large.
+		var parameter := Light3D.PARAM_RANGE
+		lamp.set_param(parameter, minf(lamp.get_param(parameter), 8.0 * _box().size.length()))
 
 
 func _add_balls() -> void:
