@@ -38,7 +38,7 @@ def interpreters() -> dict[str, str]:
 def provide(folder: Path, interpreter: str, packages: list[str]) -> str:
     """The Python of an environment in ``folder`` with exactly ``packages``, made unless it is there. Raises CalledProcessError."""
     python, stamp = folder / "bin/python", folder / "rtgi-packages.txt"
-    wanted = "\n".join([interpreter, *packages])
+    wanted = "\n".join(packages)
     if stamp.exists() and stamp.read_text() == wanted and python.exists():
         return str(python)
     shutil.rmtree(folder, ignore_errors=True)
