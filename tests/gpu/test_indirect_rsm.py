@@ -108,6 +108,7 @@ def test_lamps_that_light_nothing_are_dark(indirect):
     scene = lit_by(build.point_light((0.0, 0.0, 1.0)))
     made = indirect.make_indirect(bake(scene), scene)
     points, normals = points_in(1.0, 100), directions(100)
+    assert made.capture(drawn(replace(scene, instances=()))) and not irradiance(made, points, normals).any()
     # A sun along the plane, and no lamp at all.
     for lights in ((), (replace(SUN, direction_world=np.float32([1.0, 0.0, 0.0])),)):
         assert made.capture(drawn(replace(scene, lights=lights)))

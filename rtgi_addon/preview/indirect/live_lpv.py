@@ -46,7 +46,7 @@ class LpvLight(RelitLight):
         """See FieldLight."""
         self._drawn, bake = drawn, self._field.bake
         known = None if bake is None else bake.context.scene
-        if known is not None and same_values(known.world, drawn.scene.world):
+        if known is not None and drawn.surfaces is not None and same_values(known.world, drawn.scene.world):
             self._light(drawn)
             if not changed_surfaces(known, drawn.scene):
                 self.forget()
@@ -58,7 +58,7 @@ class LpvLight(RelitLight):
         super().take(field, tables)
         self._field, self._live = field, None
         known, scene = field.bake.context.scene, self._drawn.scene
-        if scene is not known and same_values(known.world, scene.world):
+        if scene is not known and self._drawn.surfaces is not None and same_values(known.world, scene.world):
             # The worker is behind what is drawn: that meets the light at its new places at least.
             self._light(self._drawn)
 

@@ -52,7 +52,9 @@ class RsmLight(FieldLight):
 
     def capture(self, drawn: Drawn) -> bool:
         """See FieldLight."""
-        views = [view for own in map_views(drawn.scene, drawn.bounds, self._settings) for view in own]
+        # Nothing to meet: views would be fitted to no extent.
+        views = [] if drawn.surfaces is None else [view for own in map_views(drawn.scene, drawn.bounds, self._settings)
+                                                   for view in own]
         # By what the lamp sends through each map: what that meets is known to the GPU only.
         strength = np.array([float(luminance(texel_power(drawn.scene.lights[view.lamp], view).sum(axis=(0, 1), dtype=np.float64)))
                              for view in views])
