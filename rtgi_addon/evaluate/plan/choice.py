@@ -23,7 +23,7 @@ from .search import Found, Search, upper
 from .unseen import wanted_probes
 
 # Surface points that a plan is made on, each under several normals.
-POINTS = 512
+POINTS = 2048
 # Probes are only left out where that saves more than this share.
 WORTH_LEAVING_OUT = 0.05
 # A lattice of more probes than this is not proposed unless asked for: an irradiance volume of 5 MB at order 2 and half precision.

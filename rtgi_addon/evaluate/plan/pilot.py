@@ -23,6 +23,7 @@ from ...transport.context import LightContext
 from ...transport.ray_counter import count_rays
 from ..metrics import Figure
 from ..receivers import Receivers
+from ..references import Truth
 from .gathering import HALVES, PROBE_RAYS, ProbeLight, light_at_probes, light_at_receivers
 from .sample import NORMALS_PER_POINT, Sample
 from .sparse import SparseField, SparseLookup, positions_of, probes_read
@@ -31,8 +32,9 @@ from .sparse import SparseField, SparseLookup, positions_of, probes_read
 PILOT_ERROR = 0.1
 # Rays of a receiver where 5 % are asked for, and the least and the most.
 RECEIVER_RAYS, RECEIVER_RANGE = 256, (128, 4096)
-# The share of the surface points on which a lattice is measured at first.
-FIRST_SHARE = 0.25
+# Shares of the surface points on which a lattice is measured: more only where fewer leave open whether it will do.
+LEVELS = (1.0 / 16.0, 0.25, 1.0)
+FEWEST_POINTS = 64
 # What the cache itself is off at surfaces, as a share of the bake's target error: both sides of the pilot's comparison share a
 # cache, so this is not seen in it. Measured against the path tracer on the samples: a tenth to a sixth.
 CACHE_SHARE = 0.15
@@ -119,27 +121,41 @@ class Pilot:
         self.cache = surface_cache(context, volumes, self.settings, seed)
         self.receiver_rays = int(np.clip(RECEIVER_RAYS * 2.0 ** round(2.0 * np.log2(0.05 / target)), *RECEIVER_RANGE))
         self._known: dict[tuple, Reading] = {}
-        with count_rays() as counter:
-            started = perf_counter()
-            self.truth = light_at_receivers(context, self.cache, self.settings, sample.receivers, self.receiver_rays,
-                                            seed + 1, progress)
-            self.truth_effort = Effort(counter.rays, perf_counter() - started)
+        self.truth, self.truth_effort = Truth(*np.zeros((2, 0, 3))), Effort(0, 0.0)
+        self._trace_truth(self.points(0), progress)
 
     @property
     def readings(self) -> tuple[Reading, ...]:
         """All that was measured so far."""
         return tuple(self._known.values())
 
-    def measure(self, resolutions: tuple[tuple[int, int, int], ...], progress: Progress, whole: bool = True) -> Reading:
-        """The Reading of the volumes at ``resolutions``, on all receivers or on the first FIRST_SHARE of them; what was measured
-        before is not measured again. Raises Cancelled."""
+    def points(self, level: int) -> int:
+        """Surface points of a ``level`` of LEVELS."""
+        return max(min(FEWEST_POINTS, self.sample.points), round(LEVELS[level] * self.sample.points))
+
+    def measure(self, resolutions: tuple[tuple[int, int, int], ...], progress: Progress, level: int = -1) -> Reading:
+        """The Reading of the volumes at ``resolutions`` on the surface points of ``level``; what was measured before is not
+        measured again. Raises Cancelled."""
         resolutions = tuple(tuple(int(count) for count in resolution) for resolution in resolutions)
-        points = self.sample.points if whole else max(1, round(FIRST_SHARE * self.sample.points))
+        points = self.points(level)
+        self._trace_truth(points, progress.span(0.0, 0.2))
         key = resolutions, points
         if key not in self._known:
             volumes = tuple(replace(volume, resolution=own) for volume, own in zip(self.volumes, resolutions, strict=True))
             self._known[key] = self._measured(volumes, self.sample.receivers.take(slice(0, points * NORMALS_PER_POINT)), progress)
         return self._known[key]
+
+    def _trace_truth(self, points: int, progress: Progress) -> None:
+        """Have the irradiance at the receivers of the first ``points`` points."""
+        done, wanted = len(self.truth.mean), points * NORMALS_PER_POINT
+        if done >= wanted:
+            return
+        with count_rays() as counter:
+            started = perf_counter()
+            more = light_at_receivers(self.context, self.cache, self.settings, self.sample.receivers.take(slice(done, wanted)),
+                                      self.receiver_rays, self._seed + 1 + done, progress)
+            effort = Effort(self.truth_effort.rays + counter.rays, self.truth_effort.seconds + perf_counter() - started)
+        self.truth, self.truth_effort = Truth(*(np.concatenate(parts) for parts in zip(self.truth, more, strict=True))), effort
 
     def _measured(self, volumes: tuple[ProbeVolume, ...], receivers: Receivers, progress: Progress) -> Reading:
         points = receivers.points

@@ -61,7 +61,7 @@ class Prices:
         pilot = self._pilot
         settings, pilots = ProbeSettings(error=error), ProbeSettings(error=PILOT_ERROR)
         size = texel_size(pilot.context, volumes, _texels(error))
-        measured = max(pilot.truth_effort.rays - len(pilot.sample.receivers.points) * pilot.receiver_rays,
+        measured = max(pilot.truth_effort.rays - len(pilot.truth.mean) * pilot.receiver_rays,
                        pilot.cache.count * pilot.cache.rays)
         return measured * cache_rays(settings) / cache_rays(pilots) * (pilot.cache.layout.size / size) ** 2
 

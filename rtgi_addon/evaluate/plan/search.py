@@ -14,7 +14,7 @@ import numpy as np
 from ...errors import BakeError
 from ...progress import Progress
 from ..metrics import Figure
-from .pilot import Pilot, Reading
+from .pilot import LEVELS, Pilot, Reading
 from .price import Prices
 
 # Target errors of the probes' own rays that are weighed against a finer lattice.
@@ -102,11 +102,11 @@ class Search:
         """The file's lattices with ``factor`` times the probes along each axis; no axis with several keeps only one."""
         return tuple(tuple(max(min(2, count), round(count * factor)) for count in resolution) for resolution in self._files)
 
-    def _measure(self, resolutions: Resolutions, whole: bool = True) -> Reading:
+    def _measure(self, resolutions: Resolutions, level: int = -1) -> Reading:
         self._progress.step(0.0, "measuring lattices")
         self._measured += 1
         done = self._measured / (self._measured + 4.0)
-        return self._pilot.measure(resolutions, self._progress.span(done - 0.1 * (1 - done), done), whole)
+        return self._pilot.measure(resolutions, self._progress.span(done - 0.1 * (1 - done), done), level)
 
     def _passes(self, reading: Reading, order: int, ray_error: float) -> bool:
         return upper(reading.error(order, ray_error)) <= self._target
@@ -135,18 +135,22 @@ class Search:
     def _either(self, factor: float, order: int) -> Reading:
         """The better of two lattices at ``factor``: the one that has a probe more along each axis may miss the wall that a layer of
         the other lies in."""
-        reading = self._first_look(self.at(factor))
+        highest = max(self._pilot.orders)
+        reading = self._decided(self.at(factor), highest, RAY_ERRORS[-1], 0)
         shifted = _shifted(self.at(factor))
-        if self._passes(reading, max(self._pilot.orders), RAY_ERRORS[-1]) or self._affordable(shifted, order):
+        if self._passes(reading, highest, RAY_ERRORS[-1]) or self._affordable(shifted, order):
             return reading
-        return min(reading, self._first_look(shifted), key=lambda one: one.error(max(self._pilot.orders)).value)
+        return min(reading, self._decided(shifted, highest, RAY_ERRORS[-1], 0), key=lambda one: one.error(highest).value)
 
-    def _first_look(self, resolutions: Resolutions) -> Reading:
-        """A reading on some of the receivers, or on all of them where some leave open whether the target is met."""
-        reading = self._measure(resolutions, whole=False)
-        error = reading.error(max(self._pilot.orders), RAY_ERRORS[-1])
-        sure = upper(error) <= self._target or 2.0 * error.value - upper(error) > self._target
-        return reading if sure else self._measure(resolutions)
+    def _decided(self, resolutions: Resolutions, order: int, ray_error: float, level: int) -> Reading:
+        """A reading on as many receivers, from ``level`` up, as it takes to tell whether the target is met. Errors have rare great
+        ones among them, which few receivers miss: beyond the lowest level a target counts as met on all of them alone."""
+        for own in range(level, len(LEVELS)):
+            reading = self._measure(resolutions, own)
+            error = reading.error(order, ray_error)
+            if 2.0 * error.value - upper(error) > self._target or (level == 0 and upper(error) <= self._target):
+                break
+        return reading
 
     def _last_step(self, climb: list[tuple[float, Reading]], order: int) -> float | None:
         """The largest factor below the limit, past the last one that was measured."""
@@ -178,10 +182,11 @@ class Search:
         for _ in range(TRIES):
             if self._affordable(self.at(factor), order):
                 break
-            reading = self._measure(self.at(factor))
+            reading = self._decided(self.at(factor), order, ray_error, 1)
             shifted = _shifted(self.at(factor))
             if not self._passes(reading, order, ray_error) and not self._affordable(shifted, order):
-                reading = min(reading, self._measure(shifted), key=lambda one: upper(one.error(order, ray_error)))
+                others = reading, self._decided(shifted, order, ray_error, 1)
+                reading = min(others, key=lambda one: upper(one.error(order, ray_error)))
             bound = upper(reading.error(order, ray_error))
             following = factor * (bound / self._target) ** (1.0 / rate) * OVERSHOOT
             if bound > self._target:
@@ -218,13 +223,13 @@ class Search:
         axes = [(volume, axis) for volume, resolution in enumerate(base.resolutions) for axis in range(3) if resolution[axis] > 2]
         if len(axes) < 2 or len(axes) > MOST_AXES:
             return base
-        square = self._measure(base.resolutions, whole=False).error(order).value ** 2
+        square = self._measure(base.resolutions, 0).error(order).value ** 2
         shares = {}
         for volume, axis in axes:
             coarser = _changed(base.resolutions, volume, axis, max(2, round(base.resolutions[volume][axis] / COARSENED)))
             ratio = base.resolutions[volume][axis] / coarser[volume][axis]
             if ratio > 1.0:
-                rise = self._measure(coarser, whole=False).error(order).value ** 2 - square
+                rise = self._measure(coarser, 0).error(order).value ** 2 - square
                 shares[volume, axis] = max(rise, 0.0) / (ratio ** (2 * rate) - 1.0)
         allowed = square * (self._target / max(upper(base.error(order, ray_error)), 1e-9)) ** 2
         proposal = _cheapest(base.resolutions, shares, square, allowed, rate)
@@ -233,7 +238,7 @@ class Search:
         for resolutions in (proposal, middle):
             if sum(map(np.prod, resolutions)) > 0.95 * base.lattice_points or self._affordable(resolutions, order):
                 continue
-            reading = self._measure(resolutions)
+            reading = self._decided(resolutions, order, ray_error, 1)
             if self._passes(reading, order, ray_error):
                 return reading
         return base
