@@ -95,11 +95,13 @@ def download(platform: str, python: str, folder: Path) -> Path:
         ], capture_output=True, text=True, check=False)
         if ran.returncode:
             said = [line.strip() for line in (ran.stdout + ran.stderr).splitlines()]
+            wheel = f"the wheel of {platform} for Python {python}"
+            if any("DO NOT MATCH" in line for line in said):
+                raise BuildError(f"{wheel} is not the one that tools/wheels.txt pins: find out why the package index has another")
             # Without network pip's last words are that it found no version; why stands in a warning before.
-            reasons = [line for line in said if "connection" in line.lower() or "DO NOT MATCH" in line]
-            reason = (reasons or [line for line in said if line.startswith("ERROR")] or ["pip gave no reason"])[0]
-            raise BuildError(f"cannot download the wheel of {platform} for Python {python} ({reason[:300]}): connect to the "
-                             f"network, or put the wheels of tools/wheels.txt into {folder}")
+            reasons = [line for line in said if "connection" in line.lower()] or [line for line in said if line.startswith("ERROR")]
+            raise BuildError(f"cannot download {wheel} ({(reasons or ['pip gave no reason'])[0][:300]}): connect to the network, "
+                             f"or put the wheels of tools/wheels.txt into {folder}")
         found, = Path(temporary).iterdir()
         return found.replace(folder / found.name)
 
@@ -137,7 +139,7 @@ def repack(path: Path, target: Path) -> None:
     with zipfile.ZipFile(path) as made, zipfile.ZipFile(target, "w") as archive:
         for entry in sorted(made.infolist(), key=lambda entry: entry.filename):
             info = zipfile.ZipInfo(entry.filename, MOMENT)
-            info.compress_type, info.external_attr = entry.compress_type, 0o644 << 16
+            info.compress_type, info.external_attr, info.create_system = entry.compress_type, 0o644 << 16, 3
             archive.writestr(info, made.read(entry), compresslevel=9)
 
 
@@ -152,9 +154,9 @@ def build(platforms: list[str], output: Path, kept: Path) -> list[Path]:
     wheels = [wheel for platform in platforms for wheel in fetch_wheels(platform, kept)]
     output.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as temporary:
-        source, made = Path(temporary) / "source", Path(temporary) / "made"
-        source.mkdir()
-        made.mkdir()
+        source, made, packed = (Path(temporary) / name for name in ("source", "made", "packed"))
+        for folder in (source, made, packed):
+            folder.mkdir()
         stage(source, platforms, wheels)
         run_tool("validate", source)
         run_tool("build", "--source-dir", source, "--output-dir", made, "--split-platforms")
@@ -163,10 +165,10 @@ def build(platforms: list[str], output: Path, kept: Path) -> list[Path]:
             path, = made.glob(f"*-{platform.replace('-', '_')}.zip")
             if wheels_in(path) != (len(PYTHONS) if PLATFORMS[platform] else 0):
                 raise BuildError(f"{path.name} carries {wheels_in(path)} wheels: Blender's tool does not know a tag of theirs")
-            zips.append(output / path.name)
+            zips.append(packed / path.name)
             repack(path, zips[-1])
             run_tool("validate", zips[-1])
-        return zips
+        return [Path(shutil.move(path, output / path.name)) for path in zips]
 
 
 def main() -> int:

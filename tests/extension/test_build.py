@@ -117,6 +117,14 @@ def test_without_a_network_one_line_says_what_to_do(tmp_path):
     assert not list(tmp_path.glob("*.zip")) and not list((tmp_path / "wheels").iterdir())
 
 
+def test_a_wheel_of_other_bytes_is_refused(tool, tmp_path, monkeypatch):
+    """As pip reports it, which compares what it downloads with wheels.txt."""
+    said = "ERROR: THESE PACKAGES DO NOT MATCH THE HASHES FROM THE REQUIREMENTS FILE."
+    monkeypatch.setattr(tool.subprocess, "run", lambda command, **_: subprocess.CompletedProcess(command, 1, "", said))
+    with pytest.raises(tool.BuildError, match=r"not the one that tools/wheels\.txt pins"):
+        tool.download("windows-x64", "3.11", tmp_path)
+
+
 def test_a_kept_wheel_that_is_not_the_pinned_one_is_fetched_anew(tool, tmp_path, monkeypatch):
     fetched = []
     monkeypatch.setattr(tool, "download", lambda platform, python, folder: fetched.append(python) or folder / python)
