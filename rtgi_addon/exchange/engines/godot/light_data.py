@@ -12,7 +12,7 @@ Read in Godot 4.6: `LightStorage::lightmap_tap_sh_light` (a node: plane normal a
 """
 
 from dataclasses import dataclass
-from itertools import pairwise, permutations
+from itertools import permutations
 
 import numpy as np
 
@@ -21,6 +21,12 @@ from ..volumes import ExportVolume
 # How many times the bounds are larger than the volumes: Godot darkens objects towards the corners of the bounds, and black out.
 _REACH = 4.0
 _ORDERS = tuple(permutations(range(3)))
+# Within a cell: x > y; if so y > z, else x > z; if neither ends it x > z or y > z. Over and under, a leaf is -1 - tetrahedron.
+_CELL_NODES = 5
+_CELL_NORMALS = np.array([[1, -1, 0], [0, 1, -1], [1, 0, -1], [1, 0, -1], [0, 1, -1]], np.float64)
+_CELL_CHILDREN = np.array([[1, 2], [-1 - _ORDERS.index((0, 1, 2)), 3], [-1 - _ORDERS.index((1, 0, 2)), 4],
+                           [-1 - _ORDERS.index((0, 2, 1)), -1 - _ORDERS.index((2, 0, 1))],
+                           [-1 - _ORDERS.index((1, 2, 0)), -1 - _ORDERS.index((2, 1, 0))]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,44 +75,25 @@ class LightData:
 
 def light_data(volumes: tuple[ExportVolume, ...]) -> LightData:
     """The capture data of ``volumes``, finest first."""
-    tree = _Tree()
-    points, sh, tetrahedra = [], [], []
-    first_point = first_tetrahedron = 0
+    points, sh, tetrahedra, planes, children = [], [], [], [], []
+    first_point = first_tetrahedron = first_node = 0
     for number, volume in enumerate(volumes):
         own_points, own_sh, own_tetrahedra = _lattice(volume)
-        box = _box_planes(volume) if number + 1 < len(volumes) else []
-        gates = [tree.node(plane) for plane in box]
-        for gate, following in pairwise(gates):
-            tree.children[gate][1] = following
-        root = _cells_tree(tree, volume, first_tetrahedron)
-        if gates:
-            tree.children[gates[-1]][1] = root
-            for gate in gates:
-                tree.children[gate][0] = len(tree.planes)
+        own_planes, own_children = _tree(volume, first_node, first_tetrahedron, gated=number + 1 < len(volumes))
         points.append(own_points)
         sh.append(own_sh)
         tetrahedra.append(own_tetrahedra + first_point)
+        planes.append(own_planes)
+        children.append(own_children)
         first_point += len(own_points)
         first_tetrahedron += len(own_tetrahedra)
+        first_node += len(own_planes)
     points = np.concatenate(points).astype(np.float32)
     low, high = points.min(axis=0), points.max(axis=0)
     centre, half = 0.5 * (low + high), _REACH * 0.5 * (high - low)
-    return LightData(points, np.concatenate(sh), np.concatenate(tetrahedra).astype(np.int32), np.array(tree.planes, np.float32),
-                     np.array(tree.children, np.int32), np.stack([centre - half, 2.0 * half]))
-
-
-class _Tree:
-    """Nodes as they are added: ``planes`` and ``children``, over and under."""
-
-    def __init__(self):
-        self.planes: list[np.ndarray] = []
-        self.children: list[list[int]] = []
-
-    def node(self, plane: np.ndarray) -> int:
-        """The number of a new node with ``plane`` (4,), normal of unit length."""
-        self.planes.append(plane)
-        self.children.append([0, 0])
-        return len(self.planes) - 1
+    return LightData(points, np.concatenate(sh), np.concatenate(tetrahedra).astype(np.int32),
+                     np.concatenate(planes).astype(np.float32), np.concatenate(children).astype(np.int32),
+                     np.stack([centre - half, 2.0 * half]))
 
 
 def _coordinates(count: int) -> np.ndarray:
@@ -132,70 +119,72 @@ def _lattice(volume: ExportVolume) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return points.reshape(-1, 3), sh.reshape(-1, *sh.shape[3:]).astype(np.float32), tetrahedra
 
 
-def _plane(volume: ExportVolume, normal_lattice: np.ndarray, distance: float) -> np.ndarray:
-    """The world plane (4,) of n·l = ``distance`` in lattice coordinates."""
+def _tree(volume: ExportVolume, first_node: int, first_tetrahedron: int, gated: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Planes (b, 4) and children (b, 2), over and under, of one volume: if ``gated`` the six sides of its box, what lies over
+    any of which is sent on to the next volume's tree; then the k-d tree over the cells, then the comparisons in each cell."""
+    gates = 6 if gated else 0
+    root = first_node + gates
+    axes, positions, children = _cells(volume.resolution)
+    cells = len(positions) + 1
+    first_cell = root + len(positions)
+    children = np.where(children < 0, first_cell + _CELL_NODES * (-1 - children), root + children)
+    coordinates = [_coordinates(count) for count in volume.resolution]
+    splits = np.array([coordinates[axis][position] for axis, position in zip(axes, positions, strict=True)])
+    planes = [_planes(volume, np.eye(3)[axes], splits), _comparisons(volume, coordinates)]
+    number = np.arange(cells)[:, None, None]
+    inner = np.where(_CELL_CHILDREN < 0, _CELL_CHILDREN - first_tetrahedron - len(_ORDERS) * number,
+                     first_cell + _CELL_NODES * number + _CELL_CHILDREN)
+    children = [children, inner.reshape(-1, 2)]
+    if gated:
+        normals = np.concatenate([np.eye(3), -np.eye(3)])
+        planes.insert(0, _planes(volume, normals, np.concatenate([np.array(volume.resolution) - 0.5, np.full(3, 0.5)])))
+        after = first_node + gates + len(positions) + _CELL_NODES * cells
+        children.insert(0, np.stack([np.full(gates, after), np.arange(first_node + 1, first_node + gates + 1)], axis=1))
+    return np.concatenate(planes), np.concatenate(children)
+
+
+def _planes(volume: ExportVolume, normals: np.ndarray, distances: np.ndarray) -> np.ndarray:
+    """World planes (n, 4) with unit normals of n·l = distance in lattice coordinates."""
     matrix = volume.lattice_from_offset
-    normal = normal_lattice @ matrix[:3, :3]
-    distance = distance - normal_lattice @ matrix[:3, 3] + normal @ volume.centre
-    return np.append(normal, distance) / np.linalg.norm(normal)
+    world = normals @ matrix[:3, :3]
+    planes = np.concatenate([world, (distances - normals @ matrix[:3, 3] + world @ volume.centre)[:, None]], axis=1)
+    return planes / np.linalg.norm(world, axis=1, keepdims=True)
 
 
-def _box_planes(volume: ExportVolume) -> list[np.ndarray]:
-    """The six planes of the volume's box; what lies over any of them is outside."""
-    planes = []
-    for axis, count in enumerate(volume.resolution):
-        unit = np.eye(3)[axis]
-        planes += [_plane(volume, unit, count - 0.5), _plane(volume, -unit, 0.5)]
-    return planes
-
-
-def _cells_tree(tree: _Tree, volume: ExportVolume, first_tetrahedron: int) -> int:
-    """Add the k-d tree over the cells of ``volume`` and return its root."""
-    axes = [_coordinates(count) for count in volume.resolution]
-    counts = [len(axis) - 1 for axis in axes]
-    root = None
-    pending = [(np.zeros(3, int), np.array(counts), None)]
+def _cells(resolution) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The k-d tree over the cells between the points of a lattice: per node the axis (n,) and the point (n,) that split it, and its
+    children (n, 2), upper and lower: another node, or -1 - cell."""
+    counts = [count + 1 for count in resolution]
+    axes, positions, children = [], [], []
+    pending = [((0, 0, 0), tuple(counts), None)]
     while pending:
         low, high, parent = pending.pop()
-        sides = high - low
-        if sides.max() == 1:
-            cell = (low[2] * counts[1] + low[1]) * counts[0] + low[0]
-            corner = np.array([axes[axis][low[axis]] for axis in range(3)])
-            width = np.array([axes[axis][low[axis] + 1] for axis in range(3)]) - corner
-            node = _cell_tree(tree, volume, corner, width, first_tetrahedron + len(_ORDERS) * int(cell))
+        sides = [b - a for a, b in zip(low, high, strict=True)]
+        longest = max(sides)
+        if longest == 1:
+            node = -1 - ((low[2] * counts[1] + low[1]) * counts[0] + low[0])
         else:
-            axis = int(np.argmax(sides))
+            node, axis = len(axes), sides.index(longest)
             middle = (low[axis] + high[axis]) // 2
-            node = tree.node(_plane(volume, np.eye(3)[axis], axes[axis][middle]))
-            upper, lower = low.copy(), high.copy()
-            upper[axis] = lower[axis] = middle
-            pending += [(upper, high, (node, 0)), (low, lower, (node, 1))]
-        if parent is None:
-            root = node
-        else:
-            tree.children[parent[0]][parent[1]] = node
-    return root
+            axes.append(axis)
+            positions.append(middle)
+            children.append([0, 0])
+            split = middle,
+            pending.append((low[:axis] + split + low[axis + 1:], high, (node, 0)))
+            pending.append((low, high[:axis] + split + high[axis + 1:], (node, 1)))
+        if parent is not None:
+            children[parent[0]][parent[1]] = node
+    return np.array(axes), np.array(positions), np.array(children)
 
 
-def _cell_tree(tree: _Tree, volume: ExportVolume, corner: np.ndarray, width: np.ndarray, first: int) -> int:
-    """Add the comparisons that tell the six tetrahedra of one cell apart and return the first."""
-    def compare(a: int, b: int) -> int:
-        normal = np.zeros(3)
-        normal[a], normal[b] = 1.0 / width[a], -1.0 / width[b]
-        return tree.node(_plane(volume, normal, float(normal @ corner)))
-
-    def leaf(*order: int) -> int:
-        return -1 - (first + _ORDERS.index(order))
-
-    x, y, z = range(3)
-    root, over, under = compare(x, y), compare(y, z), compare(x, z)
-    over_under, under_under = compare(x, z), compare(y, z)
-    tree.children[root] = [over, under]
-    tree.children[over] = [leaf(x, y, z), over_under]
-    tree.children[over_under] = [leaf(x, z, y), leaf(z, x, y)]
-    tree.children[under] = [leaf(y, x, z), under_under]
-    tree.children[under_under] = [leaf(y, z, x), leaf(z, y, x)]
-    return root
+def _comparisons(volume: ExportVolume, coordinates: list[np.ndarray]) -> np.ndarray:
+    """The planes (cells * 5, 4) on which two of a cell's coordinates, each from 0 to 1, are equal."""
+    corners = np.meshgrid(*(axis[:-1] for axis in reversed(coordinates)), indexing="ij")
+    widths = np.meshgrid(*(np.diff(axis) for axis in reversed(coordinates)), indexing="ij")
+    corner, width = (np.stack(parts[::-1], axis=-1).reshape(-1, 3) for parts in (corners, widths))
+    normals = _CELL_NORMALS / width[:, None]
+    distances = np.einsum("cni,ci->cn", normals, corner)
+    return _planes(volume, normals.reshape(-1, 3), distances.reshape(-1))
 
 
 def _numbers(values: np.ndarray) -> str:

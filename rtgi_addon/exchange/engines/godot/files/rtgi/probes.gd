@@ -13,11 +13,26 @@ const DOUBLE_SIDED := preload("surface_double_sided.gdshader")
 ## The part of the scene that is lit.
 @export var target: NodePath = ^".."
 ## Draw StandardMaterial3D with surface.gdshader; off: only your own shaders are set up.
-@export var convert_materials := true
+@export var convert_materials := true:
+	set(value):
+		convert_materials = value
+		if is_node_ready() and is_inside_tree():
+			_restore()
+			refresh()
 
 var volumes := Volumes.new()
 var _converted := {}  # BaseMaterial3D -> the ShaderMaterial that stands in for it
 var _shown: Array[ShaderMaterial] = []  # every material that was given the uniforms
+var _drawn_otherwise := {}  # MeshInstance3D -> true: those with stand-ins
+
+
+func _enter_tree() -> void:
+	if is_node_ready():
+		refresh()
+
+
+func _exit_tree() -> void:
+	_restore()
 
 
 func _ready() -> void:
@@ -72,10 +87,27 @@ func _light(mesh: MeshInstance3D) -> void:
 		var stand_in := _stand_in(material)
 		if stand_in == null:
 			continue
+		_drawn_otherwise[mesh] = true
 		if mesh.material_override != null:
 			RenderingServer.instance_geometry_set_material_override(mesh.get_instance(), stand_in.get_rid())
 		else:
 			RenderingServer.instance_set_surface_override_material(mesh.get_instance(), surface, stand_in.get_rid())
+
+
+## Draws all meshes with their own materials again.
+func _restore() -> void:
+	for mesh: Variant in _drawn_otherwise:
+		if not is_instance_valid(mesh) or mesh.mesh == null:
+			continue
+		RenderingServer.instance_geometry_set_material_override(mesh.get_instance(), _rid(mesh.material_override))
+		for surface in mesh.get_surface_override_material_count():
+			RenderingServer.instance_set_surface_override_material(mesh.get_instance(), surface,
+					_rid(mesh.get_surface_override_material(surface)))
+	_drawn_otherwise.clear()
+
+
+static func _rid(material: Material) -> RID:
+	return material.get_rid() if material != null else RID()
 
 
 func _show(material: ShaderMaterial) -> void:
