@@ -54,8 +54,10 @@ function prepareLamp(light, radius) {
     const towards = light.target.getWorldPosition(new THREE.Vector3());
     const direction = light.getWorldPosition(new THREE.Vector3()).sub(towards).normalize();
     light.shadow.camera = new THREE.OrthographicCamera(-radius, radius, radius, -radius, 0, 4 * radius);
-    light.target.position.copy(light.target.parent.worldToLocal(centre.clone()));
-    light.position.copy(light.parent.worldToLocal(centre.addScaledVector(direction, 2 * radius)));
+    light.position.copy(light.parent.worldToLocal(direction.multiplyScalar(2 * radius).add(centre)));
+    light.updateMatrixWorld();
+    // The loader makes the target a child of the lamp.
+    light.target.position.copy(light.target.parent.worldToLocal(centre));
   }
   if (light.shadow) {
     light.shadow.mapSize.set(2048, 2048);
