@@ -44,6 +44,8 @@ def test_wrong_options_are_told_before_the_file_is_opened(tmp_path):
     out = "--out", tmp_path / "bake"
     for words, said in ((("bake", *out, "--technique", "auto", "--rays", "64"), "chooses rays itself"),
                         (("bake", *out, "--technique", "auto", "--set", "max_rays=512"), "chooses max_rays itself"),
+                        (("bake", *out, "--technique", "auto", "--preset", "draft"), "preset"),
+                        (("bake", *out, "--technique", "auto", "--device", "gpu"), "runs on the CPU"),
                         (("bake", *out, "--keep-air"), "are for a plan"),
                         (("bake", *out, "--technique", "auto", "--error", "7"), "error is 7"),
                         (("plan", "--memory", "none"), "memory"), (("plan", "--error", "0"), "error is 0")):

@@ -146,7 +146,7 @@ def test_several_volumes_are_planned_together():
 
 
 def test_targets_that_make_no_sense_and_scenes_without_volumes():
-    for wrong in ({"error": 0.0}, {"error": 2.0}, {"memory": 0}, {"probes": 0}):
+    for wrong in ({"orders": (9,)}, {"error": 0.0}, {"error": 2.0}, {"memory": 0}, {"probes": 0}):
         with pytest.raises(UsageError):
             Target(**wrong)
     with pytest.raises(BakeError, match="no probe volume"):

@@ -3,7 +3,7 @@
 import argparse
 
 from ... import techniques
-from ...errors import BakeError, UsageError
+from ...errors import UsageError
 from ...exchange.bundle import check_target
 from ...jobs.bake import bake_scene, require_device
 from ...jobs.plan import PlannedBake, bake_planned
@@ -33,7 +33,9 @@ def _check(arguments: argparse.Namespace) -> None:
         if arguments.memory is not None or arguments.keep_air or arguments.no_check:
             raise UsageError("--memory, --keep-air and --no-check are for a plan", f"add --technique {PLANNED}")
         return
-    chosen = [name for name in ("rays", "bounces") if getattr(arguments, name) is not None]
+    if arguments.device != "cpu":
+        raise UsageError("a planned bake runs on the CPU", "leave out --device, or name a technique")
+    chosen = [name for name in ("rays", "bounces", "preset") if getattr(arguments, name) is not None]
     chosen += [name for name, _ in arguments.assignments]
     if chosen:
         raise UsageError(f"--technique {PLANNED} chooses {chosen[0]} itself", "leave it out, or name a technique")
@@ -45,8 +47,6 @@ def _run(arguments: argparse.Namespace, session: Session) -> BakeSummary | Plann
     # Everything that can fail without the file fails before it is read.
     if arguments.technique != PLANNED:
         require_device(techniques.get(arguments.technique), arguments.device)
-    elif arguments.device != "cpu":
-        raise BakeError("a planned bake runs on the CPU", "leave out --device, or name a technique")
     check_target(arguments.out)
     if arguments.device == "gpu":
         from ..gpu_context import open_context

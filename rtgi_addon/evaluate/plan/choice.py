@@ -28,6 +28,8 @@ POINTS = 2048
 WORTH_LEAVING_OUT = 0.05
 # A lattice of more probes than this is not proposed unless asked for: an irradiance volume of 5 MB at order 2 and half precision.
 MOST_PROBES = 1 << 16
+# The highest order that probes have (techniques/probes/settings.py).
+MOST_ORDER = 8
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,8 @@ class Target:
     def __post_init__(self):
         if not 0.001 <= self.error <= 1.0:
             raise UsageError(f"error is {self.error:g}", "give a value from 0.001 to 1")
+        if not all(0 <= order <= MOST_ORDER for order in self.orders):
+            raise UsageError(f"order is {max(self.orders)}", f"give a value from 0 to {MOST_ORDER}")
         if self.probes < 1 or (self.memory is not None and self.memory <= 0):
             raise UsageError("a plan needs some probes and some memory", "give numbers above 0")
 

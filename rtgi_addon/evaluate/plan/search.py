@@ -25,9 +25,9 @@ CONFIDENCE, QUANTILE = 0.9, 1.2816
 STALLED, STALLS = 0.1, 2
 # An unreachable target: of so many lattices with the least error, the cheapest within this factor of it is as good as there is.
 NEARLY, CANDIDATES = 1.1, 3
-# Tries at a spacing; each goes to where the last one says that the target is met, and a little past it, and none is worth a change
-# smaller than this.
-TRIES, OVERSHOOT, NO_STEP = 5, 1.01, 0.95
+# Tries at a spacing; each goes to where the last one says that the target is met, and a little past it, in no smaller steps than
+# the third; coarser again only where that is worth more than the fourth.
+TRIES, OVERSHOOT, LEAST_STEP, NO_STEP = 5, 1.01, 1.1, 0.95
 # Another exchange of rays for probes is tried where it should cost less than this share.
 WORTH_TRYING = 0.9
 # How much coarser an axis is made to see what the light along it does, and the most (volume, axis) pairs that are told apart.
@@ -193,7 +193,7 @@ class Search:
                 failed = factor
                 if known is not None:
                     break
-                factor = max(following, factor * 1.05)
+                factor = max(following, factor * LEAST_STEP)
             else:
                 known = reading
                 if following > NO_STEP * factor or following <= failed or self.at(following) == self.at(factor):
