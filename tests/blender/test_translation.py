@@ -127,6 +127,8 @@ def test_sentences_that_no_pattern_of_the_source_shows(german, monkeypatch):
     from rtgi_addon.transport import rays
     said = [cause.text for cause in Cause if cause is not Cause.NONE] + ["3 of 2,000 receivers leak", "Relighting"]
     said.append(describe(scene_builders.closed_box().volumes[0]))
+    said += ["'Probes' goes from 4 x 4 x 4 to 8 x 6 x 4 probes: finer.", "rsm leaves out the light of the world",
+             "SH of order 2, 9 numbers a channel: the lattice is off by 4 % with it, which is more than is asked for."]
     monkeypatch.setattr(rays, "rtcore_scene", None)
     said.append(rays.slow_rays_warning())
     for text in said:
