@@ -103,7 +103,8 @@ const controls = new OrbitControls(camera, renderer.domElement);
 controls.target.copy(target);
 controls.update();
 
-// An exposure that shows a surface of medium reflectance, in the probes' average light, as medium grey.
+// An exposure that shows a surface of medium reflectance, in the probes' average light, as medium grey; where lamps add theirs,
+// a stop less.
 function exposureStops() {
   const sh = new THREE.SphericalHarmonics3(), light = new THREE.Color();
   let sum = 0, count = 0;
@@ -115,7 +116,20 @@ function exposureStops() {
       count++;
     }
   });
-  return sum > 0 ? Math.log2(0.6 * count / sum) : 0;
+  return sum > 0 ? Math.log2((probes.includesDirect || !gltf ? 0.6 : 0.3) * count / sum) : 0;
+}
+
+// Frames are drawn when something changed.
+let waiting = false;
+function draw() {
+  if (!waiting) {
+    waiting = true;
+    requestAnimationFrame(() => {
+      waiting = false;
+      renderer.render(scene, camera);
+      document.documentElement.dataset.state = 'ready';
+    });
+  }
 }
 
 const form = document.querySelector('form');
@@ -126,6 +140,7 @@ form.oninput = () => {
   renderer.toneMappingExposure = 2 ** exposure.value;
   probes.intensity = Number(intensity.value);
   balls.visible = showBalls.checked;
+  draw();
 };
 form.oninput();
 document.getElementById('info').textContent = probes.volumes
@@ -140,14 +155,11 @@ function resize() {
   const height = Math.tan(THREE.MathUtils.degToRad(given.fov / 2)) * Math.max(1, given.aspect / camera.aspect);
   camera.fov = 2 * THREE.MathUtils.radToDeg(Math.atan(height));
   camera.updateProjectionMatrix();
+  draw();
 }
 window.addEventListener('resize', resize);
 resize();
-renderer.setAnimationLoop(() => {
-  controls.update();
-  renderer.render(scene, camera);
-  document.documentElement.dataset.state ??= 'ready';
-});
+controls.addEventListener('change', draw);
 document.getElementById('message').textContent = '';
 // For the browser's console.
-window.rtgi = { THREE, scene, camera, renderer, probes, balls };
+window.rtgi = { THREE, scene, camera, renderer, probes, balls, draw };
