@@ -8,6 +8,8 @@ from .search import CONFIDENCE, Found, upper
 
 # Errors that differ by less than this share of their own standard error are alike.
 ALIKE = 1.0
+# The share of the surface that a plan out of reach names the error of.
+WORST = 0.01
 
 
 def reasons(look: Look, found: Found, chosen, files: tuple[ProbeVolume, ...], volumes: tuple[ProbeVolume, ...], target,
@@ -18,6 +20,8 @@ def reasons(look: Look, found: Found, chosen, files: tuple[ProbeVolume, ...], vo
     lines.append(_climb(found))
     lines += _lattices(files, volumes)
     lines.append(_verdict(found, chosen, target))
+    if not chosen.meets:
+        lines.append(_worst(found))
     if chosen.technique != "probes":
         lines.append(f"At this error {chosen.technique} is cheaper than exact probes.")
         return lines
@@ -47,7 +51,7 @@ def _climb(found: Found) -> str:
     order = found.order
     steps = [f"{percent(reading.error(order).value)} at {size(reading.resolutions)}" for reading in found.climb]
     text = "The lattice alone is off by " + ", ".join(steps[-4:])
-    if found.rate is None:
+    if found.rate is None or found.rate <= 0.0:
         return text + "."
     return text + f": the error falls like the spacing to the power {found.rate:.1f}."
 
@@ -79,6 +83,12 @@ def _verdict(found: Found, chosen, target) -> str:
         why = "no ray setting brings it down"
     return (f"{percent(target.error)} at surfaces cannot be met: {why}. What is planned is the cheapest that comes near the best "
             f"there is, {percent(chosen.error.value)}.")
+
+
+def _worst(found: Found) -> str:
+    pilot, order = found.reading.pilot, found.order
+    share = pilot.sample.concentration(found.reading.estimate(order), pilot.truth, WORST)
+    return f"{percent(share)} of the squared error lies on the worst {percent(WORST)} of the surface."
 
 
 def _order(found: Found) -> str:

@@ -40,12 +40,22 @@ class Sample(NamedTuple):
     def error(self, estimate: np.ndarray, truth: Truth, forgiven: np.ndarray | float = 0.0) -> Figure:
         """Relative RMSE of ``estimate`` (n, 3) at the first n receivers, weighted as in a chart, and its standard error over
         points. The variance of ``truth`` and ``forgiven`` (n, 3), the estimate's own, are taken out."""
+        return _root_ratio(*self._squares(estimate, truth, forgiven))
+
+    def concentration(self, estimate: np.ndarray, truth: Truth, share: float) -> float:
+        """What the worst ``share`` of the points has of the squared error of ``estimate`` (n, 3)."""
+        off = np.sort(np.maximum(self._squares(estimate, truth, 0.0)[0], 0.0))
+        total = float(off.sum())
+        return float(off[-max(1, round(share * len(off))):].sum()) / total if total > 0 else 0.0
+
+    @staticmethod
+    def _squares(estimate, truth: Truth, forgiven) -> tuple[np.ndarray, np.ndarray]:
+        """Squared error and squared truth (p,) of each point, without noise."""
         weights = np.tile(NORMAL_WEIGHTS, len(estimate) // NORMALS_PER_POINT)[:, None]
         points = (-1, NORMALS_PER_POINT * 3)
         mean, variance = (part[:len(estimate)] for part in truth)
-        off = (weights * ((estimate - mean) ** 2 - variance - forgiven)).reshape(points).sum(axis=1)
-        power = (weights * (mean**2 - variance)).reshape(points).sum(axis=1)
-        return _root_ratio(off, power)
+        return ((weights * ((estimate - mean) ** 2 - variance - forgiven)).reshape(points).sum(axis=1),
+                (weights * (mean**2 - variance)).reshape(points).sum(axis=1))
 
 
 def _root_ratio(off: np.ndarray, power: np.ndarray) -> Figure:

@@ -89,14 +89,15 @@ class Search:
                     ways.append((self._prices.rays(finer, ray_error, share * finer.lattice_points), factor, order, ray_error))
         readings = tuple(reading for _, reading in climb)
         if not ways:
-            return self._best(tuple(self._pilot.readings), readings, rate)
+            return self._best(readings, climb)
         _, factor, order, ray_error = min(ways, key=lambda way: way[0])
         reading = self._settle(factor, order, ray_error, exponent)
         if reading is None:
-            return self._best(tuple(self._pilot.readings), readings, rate)
+            self._limited = self._limited or "convergence"
+            return self._best(tuple(self._pilot.readings), climb)
         reading, ray_error = self._exchange(reading, order, ray_error, exponent)
         reading = self._shape(reading, order, ray_error, exponent)
-        return Found(reading, order, ray_error, reading.error(order, ray_error), True, rate, readings)
+        return Found(reading, order, ray_error, reading.error(order, ray_error), True, *self._seen(climb))
 
     def at(self, factor: float) -> Resolutions:
         """The file's lattices with ``factor`` times the probes along each axis; no axis with several keeps only one."""
@@ -180,7 +181,8 @@ class Search:
         """The coarsest lattice near ``factor`` that does, on all receivers; None if none was found that does."""
         known, failed = None, 0.0
         for _ in range(TRIES):
-            if self._affordable(self.at(factor), order):
+            self._limited = self._affordable(self.at(factor), order)
+            if self._limited:
                 break
             reading = self._decided(self.at(factor), order, ray_error, 1)
             shifted = _shifted(self.at(factor))
@@ -243,7 +245,7 @@ class Search:
                 return reading
         return base
 
-    def _best(self, readings: tuple[Reading, ...], climb: tuple[Reading, ...], rate: float | None) -> Found:
+    def _best(self, readings: tuple[Reading, ...], climb: list[tuple[float, Reading]]) -> Found:
         """The cheapest of what comes near the least error that can be had, on all receivers."""
         order = max(self._pilot.orders)
         nearest = sorted(readings, key=lambda reading: reading.error(order).value)[:CANDIDATES]
@@ -255,7 +257,14 @@ class Search:
                         ways.append((reading.error(own, ray_error), self._prices.rays(reading, ray_error), reading, own, ray_error))
         least = min(way[0].value for way in ways)
         error, _, reading, order, ray_error = min((way for way in ways if way[0].value <= NEARLY * least), key=lambda way: way[1])
-        return Found(reading, order, ray_error, error, upper(error) <= self._target, rate, climb, self._limited)
+        return Found(reading, order, ray_error, error, upper(error) <= self._target, *self._seen(climb), self._limited)
+
+    def _seen(self, climb: list[tuple[float, Reading]]) -> tuple[float | None, tuple[Reading, ...]]:
+        """Rate and readings of ``climb``, as all receivers that were asked since then have them."""
+        known = self._pilot.readings
+        latest = [(factor, max((one for one in known if one.resolutions == reading.resolutions), key=lambda one: len(one.variance)))
+                  for factor, reading in climb]
+        return _rate(latest[-2:], max(self._pilot.orders)), tuple(reading for _, reading in latest)
 
 
 def _rate(pair: list[tuple[float, Reading]], order: int) -> float | None:
