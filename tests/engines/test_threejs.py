@@ -114,6 +114,11 @@ def test_light_beyond_halves_is_refused(kit_bundle, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+def test_more_volumes_than_a_shader_holds_are_refused(kit_bundle, tmp_path):
+    with pytest.raises(BakeError, match="17 volumes are more than the 16"):
+        THREE.export(replace(kit_bundle, grids=(kit_bundle.grids[0],) * 17), tmp_path / "out")
+
+
 @pytest.mark.parametrize("release", ["three", "three-oldest"])
 def test_node_agrees(node, install_three, export, release):
     code, said = run(node, "conformance.mjs", cwd=install_three(export, release))

@@ -8,6 +8,7 @@ import json
 import shutil
 from pathlib import Path
 
+from ....errors import BakeError
 from ....progress import Progress
 from ....techniques.probes.field import ProbeField
 from ...bundle import Bundle
@@ -24,18 +25,23 @@ _FOR_EVERY = ("README.md", "package.json", "index.html", "demo.js", "rtgi/RTGIPr
 _FOR_CONFORMANCE = ("conformance.mjs", "conformance.html", "conformance/compare.js", "conformance/draw.js",
                     "conformance/webgl.js", "conformance/webgpu.js")
 _MODEL = "model.glb"
+# What the smallest WebGL 2 promises of uniforms leaves room for; RTGIProbeVolumes.js says the same.
+MOST_VOLUMES = 16
 
 
 class ThreeJs(Engine):
-    """three.js (WebGLRenderer, r160 or later), which itself is no part of an export: npm puts it into `node_modules` there."""
+    """three.js, which itself is no part of an export: npm puts it into `node_modules` there."""
 
-    name, title, description = "threejs", "three.js", "Probe volumes for WebGL: loader, material hook, light probe, demo page"
+    name, title, description = "threejs", "three.js", "Probe volumes for WebGL and WebGPU: loader, materials, light probe, demo"
     axes = Y_UP
     aliases = ("three", "three.js")
     leftovers = ("node_modules/*", "package-lock.json")
 
     def write(self, bundle: Bundle, folder: Path, settings: ExportSettings, progress: Progress) -> list[str]:
         """See ``Engine.write``."""
+        if len(bundle.grids) > MOST_VOLUMES:
+            raise BakeError(f"{len(bundle.grids)} volumes are more than the {MOST_VOLUMES} that a shader of WebGL has room for",
+                            "bake some of them into a bundle of their own with --volume")
         field, scene = engine_field(bundle), bundle.manifest["scene"]
         progress.step(0.1, "Writing probes")
         write_probes(folder / "probes.json", field, export_volumes(field, self.axes), scene)
