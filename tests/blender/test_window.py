@@ -61,6 +61,10 @@ def test_a_bake_survives_undo(seen):
     assert seen["folder after undo"].endswith("bake")
 
 
+def test_a_preset_is_one_step_of_undo(seen):
+    assert seen["preset"] == [0.01, 0.1, 0.01]
+
+
 def test_opening_a_file_ends_the_bake_in_order(seen):
     assert seen["cancelled by opening a file"]
     assert seen["after opening a file"] == seen["after undo"]

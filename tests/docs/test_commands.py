@@ -49,7 +49,7 @@ ELSEWHERE = [
               "tests/evaluate/test_stability.py"),
 ]
 # What takes long even on the smallest scene.
-SLOW = re.compile(r" (chart|stability|plan)( |$)|--technique auto")
+SLOW = re.compile(r" (chart|stability|plan|render)( |$)|--technique auto|make demo")
 NEEDS_GPU = re.compile(r" render ")
 
 
@@ -205,7 +205,8 @@ def recipe(target):
 
 
 @pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
-@pytest.mark.parametrize("command", [command for command in HERE if command.startswith("make ")])
+@pytest.mark.parametrize("command", [pytest.param(command, marks=[pytest.mark.slow] if SLOW.search(command) else [])
+                                     for command in HERE if command.startswith("make ")])
 def test_the_target_of_make_does_what_it_says(command, folder):
     """Its recipe is run; `setup`, which needs a network, is what the tests themselves were set up with."""
     target = command.split()[1]

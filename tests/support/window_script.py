@@ -162,7 +162,7 @@ def story():
     seen["stale after the bake"] = session().stale.get(window().scene.name)
 
     settings(LONG)
-    yield 1.5
+    yield from until(lambda: session().stale.get(window().scene.name))
     seen["stale after a change"] = session().stale.get(window().scene.name)
     yield from click_bake()
     yield from watch("progress")
@@ -197,6 +197,17 @@ def story():
     yield 0.2
     seen["folder after undo"] = window().scene.rtgi.last_bake.folder
     seen["after undo"] = bundle()
+
+    def target():
+        return round(window().scene.rtgi.technique_probes.error, 4)
+
+    seen["preset"] = [target()]
+    with in_view():
+        bpy.ops.rtgi.apply_preset("EXEC_DEFAULT", True, filepath=bpy.utils.preset_find("Draft", "rtgi"))
+        seen["preset"].append(target())
+        bpy.ops.ed.undo()
+    yield 0.2
+    seen["preset"].append(target())
 
     settings(LONG)
     with in_view():
