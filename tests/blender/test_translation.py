@@ -5,7 +5,6 @@ import os
 import re
 import string
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest

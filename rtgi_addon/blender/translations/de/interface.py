@@ -168,8 +168,8 @@ INTERFACE: dict[str, str] = {
     "3D textures, shader include, GDScript loader, LightmapGIData and a sample project":
         "3D-Texturen, Shader-Include, GDScript-Lader, LightmapGIData und ein Beispielprojekt",
     "three.js": "three.js",
-    "Probe volumes for WebGL: loader, material hook, light probe, demo page":
-        "Sondenvolumen für WebGL: Lader, Material-Hook, Lichtsonde, Beispielseite",
+    "Probe volumes for WebGL and WebGPU: loader, materials, light probe, demo":
+        "Sondenvolumen für WebGL und WebGPU: Lader, Materialien, Lichtsonde, Beispielseite",
     "Export to Engine": "In Engine exportieren",
     "Write the last bake as textures, shaders and a sample scene of an engine":
         "Das zuletzt Gebackene als Texturen, Shader und Beispielszene einer Engine schreiben",

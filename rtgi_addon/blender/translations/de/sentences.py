@@ -188,6 +188,7 @@ SENTENCES: dict[str, str] = {
     "choose one of {0}": "eines wählen von {0}",
     "give a value from {0} to {1}": "einen Wert von {0} bis {1} geben",
     "give a value from 0.001 to 1": "einen Wert von 0,001 bis 1 geben",
+    "give a value from 0 to {0}": "einen Wert von 0 bis {0} geben",
     "give true or false": "true oder false geben",
     "give numbers above 0": "Zahlen über 0 geben",
     "technique {0} has no setting {1}": "Technik {0} hat keine Einstellung {1}",
@@ -334,6 +335,9 @@ SENTENCES: dict[str, str] = {
         "die Lichter der Szene abschwächen und die Belichtung der Engine um ebenso viel erhöhen",
     "the bundle has {0} volumes, and a shader in Godot has samplers for {1}":
         "gebacken sind {0} Volumen, und ein Shader in Godot hat Sampler für {1}",
+    "{0} volumes are more than the {1} that a shader of WebGL has room for":
+        "{0} Volumen sind mehr als die {1}, für die ein Shader in WebGL Platz hat",
+    "bake some of them into a bundle of their own with --volume": "einige davon mit --volume in einen eigenen Ordner backen",
     "bake fewer volumes into this bundle (--volume)": "weniger Volumen in diesen Ordner backen (--volume)",
     "volume {0} makes a 3D texture of {1} x {2} x {3}, and {4} is the most that every driver has":
         "Volumen {0} ergibt eine 3D-Textur von {1} x {2} x {3}, und mehr als {4} hat nicht jeder Treiber",
