@@ -73,6 +73,12 @@ class RTGI_OT_add_preset(AddPresetBase, bpy.types.Operator):
             paths.append(f"rtgi.{attribute(technique.name)}.{item.name}")
         return paths
 
+    def remove(self, context, filepath: str) -> None:
+        """Blender asks for it: what lies in its extensions it protects itself, what lies in a clone is protected here."""
+        if Path(filepath).is_relative_to(_FOLDER):
+            raise PermissionError(f"{Path(filepath).stem} belongs to the add-on")
+        Path(filepath).unlink()
+
 
 _FOLDER = str(Path(__file__).parent)
 _CLASSES = (RTGI_PT_presets, RTGI_OT_apply_preset, RTGI_OT_add_preset)

@@ -75,6 +75,12 @@ def test_the_tooltip_says_what_a_preset_costs(settings):
     assert RTGI_OT_apply_preset.description(bpy.context, SimpleNamespace(filepath="/mine.py")) == RTGI_OT_apply_preset.__doc__
 
 
+def test_the_presets_of_the_add_on_cannot_be_removed(settings):
+    with pytest.raises(RuntimeError, match="belongs to the add-on"):
+        bpy.ops.rtgi.add_preset(name="Draft", remove_name=True)
+    assert shown() == SHIPPED
+
+
 def test_a_broken_preset_is_reported(settings, tmp_path):
     (tmp_path / "broken.py").write_text("raise ValueError('no')\n")
     with pytest.raises(RuntimeError, match="no"):

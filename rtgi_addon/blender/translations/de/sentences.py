@@ -183,7 +183,6 @@ SENTENCES: dict[str, str] = {
     # Settings.
     "unknown technique {0}": "unbekannte Technik {0}",
     "unknown engine {0}": "unbekannte Engine {0}",
-    "unknown preset {0}": "unbekannte Voreinstellung {0}",
     "unknown {0} {1}": "unbekannt: {0} {1}",
     "choose one of {0}": "eines wählen von {0}",
     "give a value from {0} to {1}": "einen Wert von {0} bis {1} geben",
