@@ -39,6 +39,7 @@ bench: setup         ## measure again what benchmarks/README.md says
 	$(PYTHON) benchmarks/relight.py
 	$(PYTHON) benchmarks/scale.py
 	$(PYTHON) benchmarks/technique_errors.py
+	$(PYTHON) benchmarks/plan.py
 	$(PYTHON) benchmarks/vpl.py
 	$(PYTHON) benchmarks/lpv.py
 	$(PYTHON) benchmarks/rsm_capture.py
