@@ -119,3 +119,16 @@ def test_users_save_and_remove_their_own(tmp_path):
     lines = [line for line in ran.stdout.splitlines() if line.split(" ")[0] in {"SAVED", "BACK", "DRAFT", "LEFT"}]
     expected = ["SAVED scripts/presets/rtgi/My_night.py", "BACK probes RAYS 99 True 3", "DRAFT blender", "LEFT False"]
     assert lines == expected, ran.stderr
+
+
+@pytest.mark.parametrize(("words", "settings"), [
+    (["--preset", "draft"], {"error": 0.1, "max_rays": 4096}),
+    (["--preset", "draft", "--error", "0.2", "--order", "1"], {"error": 0.2, "max_rays": 4096, "order": 1}),
+    (["--preset", "final", "--technique", "vpl", "--set", "lights=64"], {"lights": "64"}),
+    (["--preset", "draft", "--technique", "nobody"], {}),
+    ([], {}),
+])
+def test_in_a_shell_other_options_go_before_the_preset(words, settings):
+    from rtgi_addon.blender.cli.options import overrides
+    from rtgi_addon.blender.cli.parser import build_parser
+    assert overrides(build_parser("rtgi").parse_args(["bake", "--out", "x", *words])) == settings
