@@ -9,7 +9,8 @@ from ... import techniques
 from ...errors import BakeError, UsageError
 from ...progress import Progress
 from ...scene import ProbeVolume, Scene
-from ...techniques.probes.settings import ProbeSettings
+from ...techniques.probes.adaptive import FIRST_ROUND
+from ...techniques.probes.placement import PILOT_RAYS
 from ...transport.context import LightContext
 from ...transport.ray_counter import count_rays
 from ..metrics import Figure
@@ -28,6 +29,8 @@ POINTS = 2048
 WORTH_LEAVING_OUT = 0.05
 # A lattice of more probes than this is not proposed unless asked for: an irradiance volume of 5 MB at order 2 and half precision.
 MOST_PROBES = 1 << 16
+# Rays of a probe, its placement included, that no bake goes below.
+LEAST_RAYS = FIRST_ROUND + 2.0 * PILOT_RAYS
 # The highest order that probes have (techniques/probes/settings.py).
 MOST_ORDER = 8
 
@@ -147,7 +150,7 @@ def _limit(pilot: Pilot, prices: Prices, target: Target, resolutions, order: int
     if probes > max(target.probes, min_probes(resolutions)):
         return "number of probes"
     volumes = tuple(replace(volume, resolution=resolution) for volume, resolution in zip(pilot.volumes, resolutions, strict=True))
-    if target.memory is not None and prices.bytes(volumes, order, probes * 2.0 * ProbeSettings().max_rays ** 0.5) > target.memory:
+    if target.memory is not None and prices.bytes(volumes, order, probes * LEAST_RAYS) > target.memory:
         return "memory"
     return ""
 

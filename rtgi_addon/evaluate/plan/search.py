@@ -85,8 +85,8 @@ class Search:
                 factor = self._factor(climb, order, ray_error)
                 if factor is not None:
                     finer = next(reading for own, reading in climb if own >= factor * (1 - 1e-9))
-                    share = np.prod(self.at(factor), axis=1).sum() / finer.lattice_points
-                    ways.append((self._prices.rays(finer, ray_error, share * finer.lattice_points), factor, order, ray_error))
+                    probes = sum(map(np.prod, self.at(factor)))
+                    ways.append((self._prices.rays(finer, ray_error, probes), factor, order, ray_error))
         readings = tuple(reading for _, reading in climb)
         if not ways:
             return self._best(readings, climb)
