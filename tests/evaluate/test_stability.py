@@ -13,8 +13,22 @@ import pytest
 
 from rtgi_addon.errors import BakeError, Cancelled, UsageError
 from rtgi_addon.evaluate import stability
-from rtgi_addon.evaluate.stability import (ABOVE, CASES, HOLDS, WEAK, WORSE, Case, Limit, Result, Sample, Variant, limits, own, parts,
-                                           suite)
+from rtgi_addon.evaluate.stability import (
+    ABOVE,
+    CASES,
+    HOLDS,
+    WEAK,
+    WORSE,
+    Case,
+    Limit,
+    Result,
+    Sample,
+    Variant,
+    limits,
+    own,
+    parts,
+    suite,
+)
 from rtgi_addon.evaluate.stability.motion import flicker
 from rtgi_addon.evaluate.stability.own import OWN_NAMES, own_cases
 from rtgi_addon.jobs.stability import run_stability
@@ -188,7 +202,7 @@ def test_what_refuses_an_own_scene_is_reported_and_the_rest_goes_on(small_room, 
 
     monkeypatch.setattr(own, "find_leaks", refuse)
     report = run_stability(tmp_path, small_room, cases=["leaks", "size"], techniques=["rsm"], pictures=False)
-    assert [result.worst.parameter for result in report.results][0] == "refused: this technique will not"
+    assert report.results[0].worst.parameter == "refused: this technique will not"
     assert report.results[0].verdict == ABOVE and np.isfinite(report.results[1].figure)
     text = report.to_markdown()
     assert "visibility=true" in text and "infinite" in text and not report.worse
@@ -213,7 +227,8 @@ def test_every_kind_of_lamp_keeps_its_light_under_a_similarity():
     def lit(taken, points, normals):
         return lamp_irradiance(LightContext(taken), points, normals, normals, u)
 
-    before, after = lit(built, points, normals), lit(parts.moved(built, grown, intensity=49.0), *parts.turned(points, normals, grown))
+    before = lit(built, points, normals)
+    after = lit(parts.moved(built, grown, intensity=49.0), *parts.turned(points, normals, grown))
     assert before.max() > 1.0
     # The spot's disk is drawn in a frame of its own, which does not turn with the lamp: compare means of 64 samples.
     difference = (after - before).reshape(-1, 64, 3).mean(axis=1)
