@@ -1,5 +1,6 @@
 extends SceneTree
-## Draws the sample scene in scene-linear RGB of float32, row after row: after `--`, the file, the side, and `ball` to show the ball.
+## Draws the sample scene in scene-linear RGB of float32, row after row: after `--`, the file, the side, `ball` to show the
+## ball in the middle, and `turned` to turn the whole scene.
 
 
 func _initialize() -> void:
@@ -13,9 +14,15 @@ func _initialize() -> void:
 	viewport.render_target_update_mode = SubViewport.UPDATE_ALWAYS
 	root.add_child(viewport)
 	var scene: Node = (load("res://sample.tscn") as PackedScene).instantiate()
+	if "turned" in words:
+		scene.transform = Transform3D(Basis.from_euler(Vector3(0.4, -1.1, 2.0)), Vector3(-3.0, 5.0, 2.0))
 	viewport.add_child(scene)
-	scene.get_node("Ball").visible = words.size() > 2
-	for frame in 90 if words.size() > 2 else 5:
+	await process_frame
+	scene.set_process(false)
+	var ball: Node3D = scene.get_node("Ball")
+	ball.visible = "ball" in words
+	ball.position = scene.get_node("Probes").volumes.volumes[0].centre
+	for frame in 90 if ball.visible else 5:
 		await RenderingServer.frame_post_draw
 	print("lamps ", scene.find_children("*", "Light3D", true, false).size(), ", camera ", viewport.get_camera_3d().name)
 	var image := viewport.get_texture().get_image()

@@ -197,6 +197,10 @@ def test_the_ball_is_lit_and_follows(cornell, tmp_path):
     changed = np.abs(found - without).max(axis=-1) > 0.02
     assert 0.002 < changed.mean() < 0.1
     assert 0.05 < np.median(found[changed]) < 3.0 * without.max()
+    # All of it turned and moved, the camera too: every route has to follow.
+    turned, _ = picture(project, tmp_path / "turned.raw", "ball", "turned")
+    assert np.abs(turned - found).mean() < 5e-3 * found.mean()
+    assert np.abs(turned - found)[changed].mean() < 0.02 * found[changed].mean()
 
 
 def test_without_a_model_there_are_balls(cornell, tmp_path):

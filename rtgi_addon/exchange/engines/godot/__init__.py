@@ -21,8 +21,8 @@ from .textures import DISTANCES, PROBES, write_textures
 # The folder that a project needs, the kit, and what each holds besides the volumes.
 ADDON, KIT = "rtgi", "conformance"
 _FILES = Path(__file__).parent / "files"
-_ADDON_FILES = ("surface.gdshaderinc", "surface.gdshader", "surface_double_sided.gdshader", "volumes.gd", "probes.gd",
-                "probes.tscn")
+_ADDON_FILES = ("surface.gdshaderinc", "surface.gdshader", "surface_double_sided.gdshader", "volumes.gd", "turned_light.gd",
+                "probes.gd", "probes.tscn")
 _SAMPLE_FILES = ("README.md", "project.godot", "sample.gd", "sample.tscn")
 # Each volume takes two samplers, and desktop drivers of the Compatibility renderer have 32, of which Godot needs some.
 MAX_VOLUMES = 8

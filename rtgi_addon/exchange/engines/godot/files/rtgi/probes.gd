@@ -7,6 +7,7 @@ extends Node3D
 ## transparency is drawn with surface.gdshader in its place. Nothing of that is saved into the scene.
 
 const Volumes := preload("volumes.gd")
+const TurnedLight := preload("turned_light.gd")
 const ONE_SIDED := preload("surface.gdshader")
 const DOUBLE_SIDED := preload("surface_double_sided.gdshader")
 
@@ -23,16 +24,21 @@ const DOUBLE_SIDED := preload("surface_double_sided.gdshader")
 var volumes := Volumes.new()
 var _converted := {}  # BaseMaterial3D -> the ShaderMaterial that stands in for it
 var _shown: Array[ShaderMaterial] = []  # every material that was given the uniforms
+var _turned: LightmapGIData
+var _turned_instance: RID
+var _placing := false
 var _drawn_otherwise := {}  # MeshInstance3D -> true: those with stand-ins
 
 
 func _enter_tree() -> void:
 	if is_node_ready():
 		refresh()
+		_place_light.call_deferred()
 
 
 func _exit_tree() -> void:
 	_restore()
+	_free_turned()
 
 
 func _ready() -> void:
@@ -42,22 +48,37 @@ func _ready() -> void:
 	set_notify_transform(true)
 	get_tree().node_added.connect(_on_node_added)
 	refresh()
+	_place_light.call_deferred()
 
 
 func _notification(what: int) -> void:
 	if what == NOTIFICATION_TRANSFORM_CHANGED and is_node_ready():
-		update_configuration_warnings()
+		if not _placing:
+			_placing = true
+			_place_light.call_deferred()
 		volumes.world_from_local = global_transform
 		for material in _shown:
 			volumes.apply_to(material)
 
 
-func _get_configuration_warnings() -> PackedStringArray:
-	# Basis::rotate_sh of Godot 4.6 counts the signs of odd harmonics as with Condon and Shortley, its shaders do not.
-	if is_inside_tree() and not global_transform.basis.orthonormalized().is_equal_approx(Basis.IDENTITY):
-		return ["Godot turns the light of a turned LightmapGI wrongly: dynamic objects get it from wrong sides. Move this node, but "
-				+ "do not turn it, where there are any."]
-	return []
+## Dynamic objects are lit by the child node, which follows this one; where it is turned, by a turned copy of its light.
+func _place_light() -> void:
+	_placing = false
+	_free_turned()
+	var node := get_node_or_null(^"DynamicObjects") as LightmapGI
+	if not is_inside_tree() or node == null or node.light_data == null:
+		return
+	var turned := not global_transform.basis.orthonormalized().is_equal_approx(Basis.IDENTITY)
+	RenderingServer.instance_set_visible(node.get_instance(), node.is_visible_in_tree() and not turned)
+	if turned and node.is_visible_in_tree():
+		_turned = TurnedLight.placed(node.light_data, global_transform)
+		_turned_instance = RenderingServer.instance_create2(_turned.get_rid(), get_world_3d().scenario)
+
+
+func _free_turned() -> void:
+	if _turned != null:
+		RenderingServer.free_rid(_turned_instance)
+		_turned = null
 
 
 ## Looks for meshes and materials again: call it after materials were replaced.
@@ -71,6 +92,8 @@ func refresh() -> void:
 
 
 func _on_node_added(node: Node) -> void:
+	if not is_inside_tree():
+		return
 	var root := get_node_or_null(target)
 	if node is MeshInstance3D and root != null and root.is_ancestor_of(node):
 		_light.call_deferred(node)
