@@ -32,11 +32,33 @@ def chart(sample: str, options: argparse.Namespace) -> bool:
     return done.returncode == 0
 
 
+def defaults() -> list[str]:
+    """A table of every sample that was charted: errors with default settings at surfaces, the probes' with a lattice twice as fine
+    and at the probes themselves."""
+    techniques = ("probes", "vpl", "lpv", "rsm")
+    lines = ["Relative RMSE at surfaces, default settings (*×2*: probes on a lattice twice as fine; *at probes*: of the baked "
+             "coefficients; – was left out or does not apply):", "",
+             "| sample | " + " | ".join(techniques) + " | probes ×2 | at probes |", "|---|" + "---:|" * (len(techniques) + 2)]
+    for path in sorted(RESULTS.glob("*/chart.json")):
+        points = json.loads(path.read_text())["points"]
+
+        def error(technique, place="surface", lattice=1.0, points=points):
+            for point in points:
+                plain = point["default"] or lattice != 1.0
+                if point["technique"] == technique and plain and point["lattice"] == lattice and point["accuracy"].get(place):
+                    return f"{100 * point['accuracy'][place]['spread']['error']['mean']:.2g} %"
+            return "–"
+
+        cells = [error(name) for name in techniques] + [error("probes", lattice=2.0), error("probes", "probes")]
+        lines.append(f"| {path.parent.name} | {' | '.join(cells)} |")
+    return [*lines, ""]
+
+
 def index() -> str:
     """Markdown of every chart that is there."""
     lines = ["# Speed against accuracy, every sample", "",
              "Made by `make charts`. Towards the lower left is better; on the black line lie the settings that no other beats in "
-             "both time and error. Tables with every figure are behind the titles.", ""]
+             "both time and error. Tables with every figure are behind the titles.", "", *defaults()]
     for path in sorted(RESULTS.glob("*/chart.md")):
         name = path.parent.name
         taken = path.with_name("seconds.json")
