@@ -113,6 +113,7 @@ def test_sentences_are_found_by_their_patterns(german):
         "jede Sonde des Volumens 'Hall: 2' liegt in Geometrie: so rücken oder skalieren, dass es freien Raum umfasst")
     assert german("lamp Sun: light linking is not read, it lights everything").startswith("Lampe Sun: Lichtverknüpfung")
     assert german("material 'Brick': its bumps are left out") == "Material „Brick“: seine Unebenheiten bleiben außen vor"
+    assert german("unknown technique 'x': choose one of lpv, vpl") == "unbekannte Technik 'x': eines wählen von lpv, vpl"
     assert german("what nobody wrote: here") == "what nobody wrote: here"
     assert german("") == ""
 

@@ -51,15 +51,13 @@ def _expression(pattern: str) -> str:
 
 @lru_cache(maxsize=1024)
 def _known(language: str, text: str) -> str | None:
-    """``text`` translated: whole, or as a cause and its remedy with a colon between them; None if either is unknown."""
-    whole = _matched(language, text)
-    if whole is not None:
-        return whole
+    """``text`` translated: as a cause and its remedy with a colon between them, or whole; None where neither is known."""
     for colon in reversed([found.start() for found in re.finditer(": ", text)]):
         cause, remedy = _matched(language, text[:colon]), _matched(language, text[colon + 2:])
         if cause is not None and remedy is not None:
             return f"{cause}: {remedy}"
-    return None
+    # A pattern that ends in a place would take a remedy for a part of it, so it comes second.
+    return _matched(language, text)
 
 
 def _matched(language: str, text: str) -> str | None:
