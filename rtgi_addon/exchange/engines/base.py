@@ -21,6 +21,7 @@ from .axes import Axes
 MARKER = "rtgi_export.json"
 SCHEMA = "rtgi-export/1"
 
+_LICENSE = Path(__file__).with_name("LICENSE.txt")
 _BYSTANDERS = (".DS_Store", "Thumbs.db", "desktop.ini")
 
 
@@ -65,7 +66,8 @@ class Engine(ABC):
     """One engine: names, axes, and ``write``.
 
     ``aliases`` are other names that the command line takes. ``leftovers`` are patterns, relative to an export, of what the engine
-    itself writes beside its files (caches, import records): replacing an export removes them with it.
+    itself writes beside its files (caches, import records): replacing an export removes them with it. ``parts`` are the folders
+    that users copy out of an export.
     """
 
     name: ClassVar[str]
@@ -74,6 +76,7 @@ class Engine(ABC):
     axes: ClassVar[Axes]
     aliases: ClassVar[tuple[str, ...]] = ()
     leftovers: ClassVar[tuple[str, ...]] = ()
+    parts: ClassVar[tuple[str, ...]] = ()
 
     @abstractmethod
     def write(self, bundle: Bundle, folder: Path, settings: ExportSettings, progress: Progress) -> list[str]:
@@ -94,6 +97,9 @@ class Engine(ABC):
             remove_folder(new)
             new.mkdir()
             notes = self.write(bundle, new, settings, progress.span(0.0, 0.95))
+            # Games cannot take code under the add-on's own GPL; the part that goes into a project carries its license along.
+            for place in (new, *(new / name for name in self.parts)):
+                shutil.copyfile(_LICENSE, place / _LICENSE.name)
             files = tuple(sorted(item.relative_to(new).as_posix() for item in new.rglob("*") if item.is_file()))
             marker = {"schema": SCHEMA, "engine": self.name, "rtgi": RTGI_VERSION, "files": list(files)}
             write_atomically(new / MARKER, (json.dumps(marker, indent=1) + "\n").encode())

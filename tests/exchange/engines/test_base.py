@@ -17,6 +17,7 @@ class Paper(Engine):
     """An engine that reads one file."""
 
     name, title, description, axes, leftovers = "paper", "Paper", "For tests", Y_UP, ("cache/*", "*.uid")
+    parts = ("a",)
     text, failure = "first", None
 
     def write(self, bundle, folder, settings, progress):
@@ -46,11 +47,17 @@ def test_engines_are_found_by_name_and_alias():
 
 def test_the_report_names_everything(paper, kit_bundle, tmp_path):
     report = paper.export(kit_bundle, tmp_path / "out")
-    assert report.files == ("README.md", "a/probes.txt") and report.volumes == ("Known", "Hard", "Inset")
-    assert report.size == len("first") + len("read me") and report.notes == ("a note",)
+    assert report.files == ("LICENSE.txt", "README.md", "a/LICENSE.txt", "a/probes.txt")
+    assert report.volumes == ("Known", "Hard", "Inset") and report.notes == ("a note",)
+    assert report.size == sum(len(content) for name, content in contents(report.out).items() if name != MARKER)
     assert json.loads((tmp_path / "out" / MARKER).read_text())["files"] == list(report.files)
     assert json.loads(json.dumps(report.to_json()))["bytes"] == report.size and "a note" in report.to_text()
     assert list(tmp_path.iterdir()) == [tmp_path / "out"]
+
+
+def test_what_games_take_is_not_under_the_add_ons_own_license(paper, kit_bundle, tmp_path):
+    out = contents(paper.export(kit_bundle, tmp_path / "out").out)
+    assert out["a/LICENSE.txt"] == out["LICENSE.txt"] and out["LICENSE.txt"].startswith(b"MIT License")
 
 
 def test_an_export_replaces_an_earlier_one_with_what_the_engine_left(paper, kit_bundle, tmp_path):

@@ -36,6 +36,7 @@ class Godot(Engine):
     axes = Y_UP
     # What the editor writes into a project: its cache, identities of files, and import records that it completes.
     leftovers = (".godot/*", "*.uid", "*.import", ".editorconfig", ".gitattributes", ".gitignore", "model_*")
+    parts = (ADDON,)
 
     def write(self, bundle: Bundle, folder: Path, settings: ExportSettings, progress: Progress) -> list[str]:
         """See Engine.write."""

@@ -36,6 +36,7 @@ class ThreeJs(Engine):
     axes = Y_UP
     aliases = ("three", "three.js")
     leftovers = ("node_modules/*", "package-lock.json")
+    parts = ("rtgi",)
 
     def write(self, bundle: Bundle, folder: Path, settings: ExportSettings, progress: Progress) -> list[str]:
         """See ``Engine.write``."""
