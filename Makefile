@@ -29,8 +29,11 @@ lint: setup          ## check style
 extension: setup     ## build the extension's zips, one per platform, into dist/ (downloads their wheels from PyPI once)
 	$(PYTHON) tools/build_extension.py
 
-charts: setup        ## chart speed against accuracy of every sample into benchmarks/results/charts (some minutes each)
+charts: setup        ## charts, sheets beside Cycles, plans and stability of every sample into benchmarks/results (hours)
 	$(PYTHON) benchmarks/charts.py
+	$(PYTHON) benchmarks/preview_vs_cycles.py --samples 24 --cycles-samples 32 --eevee-samples 8
+	$(PYTHON) -m rtgi_addon stability --out benchmarks/results/stability
+	$(PYTHON) benchmarks/plan.py --threads 1
 
 bench: setup         ## measure again what benchmarks/README.md says
 	$(PYTHON) benchmarks/ray_rate.py
