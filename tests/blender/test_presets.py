@@ -20,8 +20,12 @@ SHIPPED = ["Draft.py", "Final.py", "Preview.py"]
 @pytest.fixture
 def settings(empty_blend):
     """``Scene.rtgi`` of a fresh file."""
+    from rtgi_addon.blender.preset_ui import RTGI_PT_presets
     rtgi_addon.register()
+    label = RTGI_PT_presets.bl_label
     yield bpy.context.scene.rtgi
+    # Blender writes the name of the preset that was applied last there.
+    RTGI_PT_presets.bl_label = label
     rtgi_addon.unregister()
 
 
