@@ -48,6 +48,10 @@ def test_from_the_zip_to_a_bake_and_back(blender, archive, tmp_path):
                   "--scale", 0.1, "--samples", 2)
     assert ran.returncode == 0 and picture.stat().st_size > 1000, ran.stderr
 
+    # The file is open, so Blender writes its model itself.
+    ran = blender("-b", SAMPLE, "--command", "rtgi", "export", out, "--engine", "godot", "--out", tmp_path / "project")
+    assert ran.returncode == 0 and (tmp_path / "project/model.glb").stat().st_size > 1000, ran.stderr
+
     ran = blender("--command", "extension", "remove", "rtgi_addon")
     assert ran.returncode == 0, ran.stdout + ran.stderr
     assert files(user) <= BLENDERS_OWN

@@ -6,7 +6,7 @@ import sys
 import traceback
 from argparse import Namespace
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 
 from ...errors import BakeError, Cancelled, UsageError
 from ...jobs.console import ConsoleProgress
@@ -54,7 +54,18 @@ def main_blender(argv: list[str]) -> int:
         import bpy
         return bool(bpy.data.filepath)
 
-    return _run(list(argv), "blender -b FILE.blend --command rtgi", read, is_open)
+    with _window():
+        return _run(list(argv), "blender -b FILE.blend --command rtgi", read, is_open)
+
+
+def _window():
+    """The file's own window as context. Blender gives commands none, and without one the context lacks what belongs to a screen
+    (its glTF exporter asks for the active object)."""
+    import bpy
+    windows = bpy.context.window_manager.windows
+    if bpy.context.window is not None or not len(windows):
+        return nullcontext()
+    return bpy.context.temp_override(window=windows[0])
 
 
 def register() -> None:
