@@ -15,7 +15,7 @@ from ..jobs.chart import chart_scene
 from ..progress import Progress
 from .bake_job import output_folder
 from .extract import extract_scene
-from .modal_job import GRACE, ModalJob
+from .modal_job import CancelJob, Job, ModalJob
 from .panels import draw_lines
 from .progress_text import bar_text
 from .session import redraw, session
@@ -26,20 +26,15 @@ from .worker import BakeWorker, duration
 _MOST_ROWS = 10
 
 
-class Charts:
+class Charts(Job):
     """The chart under way and those that were made: ``worker`` with the scene it is for, the finished or latest partial ``Chart``
     and the folder by scene name."""
 
     def __init__(self):
-        self.worker: BakeWorker | None = None
+        super().__init__()
         self.charting = ""
         self.folder: Path | None = None
         self.charts: dict[str, tuple[Chart, Path]] = {}
-
-    @property
-    def running(self) -> bool:
-        """True while something is measured."""
-        return self.worker is not None and self.worker.running
 
 
 charts = Charts()
@@ -123,23 +118,12 @@ class RTGI_OT_chart(ModalJob, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class RTGI_OT_cancel_chart(bpy.types.Operator):
+class RTGI_OT_cancel_chart(CancelJob, bpy.types.Operator):
     """Stop measuring. What was measured is kept"""
 
     bl_idname = "rtgi.cancel_chart"
     bl_label = "Cancel Chart"
-    bl_options = {"INTERNAL"}
-
-    @classmethod
-    def poll(cls, context):
-        """Only while there is something to stop."""
-        return charts.running
-
-    def execute(self, context):
-        """Ask the worker to stop at its next step."""
-        charts.worker.cancel()
-        redraw()
-        return {"FINISHED"}
+    job = charts
 
 
 class RTGI_PT_chart(bpy.types.Panel):
@@ -227,10 +211,7 @@ def register() -> None:
 
 def unregister() -> None:
     """Stop a running chart, give it a moment to end, and take everything out."""
-    if charts.worker is not None:
-        charts.worker.cancel()
-        charts.worker.join(GRACE)
-        charts.worker = None
+    charts.stop()
     charts.charts.clear()
     bpy.app.handlers.load_pre.remove(forget_charts)
     for cls in reversed(_CLASSES):

@@ -11,7 +11,7 @@ from ..exchange import engines
 from ..jobs.export import export_bundle
 from ..progress import Progress
 from .bake_job import output_folder
-from .modal_job import GRACE, ModalJob
+from .modal_job import Job, ModalJob
 from .model import export_model
 from .session import redraw, session
 from .translations import sentence
@@ -20,17 +20,12 @@ from .worker import BakeWorker
 _ENGINES = [(engine.name, engine.title, engine.description) for engine in engines.registry().values()]
 
 
-class Exports:
+class Exports(Job):
     """The export under way: its ``worker``, None before the first, and the ``folder`` of the model that goes into it."""
 
     def __init__(self):
-        self.worker: BakeWorker | None = None
+        super().__init__()
         self.folder: TemporaryDirectory | None = None
-
-    @property
-    def running(self) -> bool:
-        """True while files are written."""
-        return self.worker is not None and self.worker.running
 
     def forget_model(self) -> None:
         """Remove the model's file."""
@@ -158,10 +153,7 @@ def register() -> None:
 
 def unregister() -> None:
     """Stop a running export, give it a moment to end, and take everything out."""
-    if exports.worker is not None:
-        exports.worker.cancel()
-        exports.worker.join(GRACE)
-        exports.worker = None
+    exports.stop()
     exports.forget_model()
     del bpy.types.Scene.rtgi_export
     for cls in reversed(_CLASSES):

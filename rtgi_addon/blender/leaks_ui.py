@@ -9,26 +9,21 @@ from ..errors import BakeError
 from ..evaluate.leaks import Cause, find_leaks
 from ..progress import Progress
 from ..transport.context import LightContext
-from .modal_job import GRACE, ModalJob
+from .modal_job import Job, ModalJob
 from .panels import draw_lines
 from .session import redraw, session
 from .translations import sentence
 from .worker import BakeWorker
 
 
-class Leaks:
+class Leaks(Job):
     """The search under way (``worker``, for the scene and technique ``searching``), and by scene name and technique what was found
     with the field that it was found in."""
 
     def __init__(self):
-        self.worker: BakeWorker | None = None
+        super().__init__()
         self.searching: tuple[str, str] = "", ""
         self.found: dict[tuple[str, str], tuple] = {}
-
-    @property
-    def running(self) -> bool:
-        """True while rays are traced."""
-        return self.worker is not None and self.worker.running
 
     def of(self, scene: bpy.types.Scene, field):
         """The LeakMap of ``field`` in ``scene``, or None: another bake has others."""
@@ -151,10 +146,7 @@ def register() -> None:
 
 def unregister() -> None:
     """Stop a running search, give it a moment to end, and take everything out."""
-    if leaks.worker is not None:
-        leaks.worker.cancel()
-        leaks.worker.join(GRACE)
-        leaks.worker = None
+    leaks.stop()
     leaks.found.clear()
     bpy.app.handlers.load_pre.remove(forget_leaks)
     for cls in reversed(_CLASSES):

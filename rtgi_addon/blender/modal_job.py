@@ -5,11 +5,48 @@ import bpy
 from ..errors import BakeError
 from .progress_text import status_text
 from .session import redraw, redraw_progress
-from .worker import Report
+from .worker import BakeWorker, Report
 
 _TICK = 0.1
 # What a cancelled run is given to end [s].
 GRACE = 5.0
+
+
+class Job:
+    """What one operator has under way: its ``worker``, None before the first run."""
+
+    def __init__(self):
+        self.worker: BakeWorker | None = None
+
+    @property
+    def running(self) -> bool:
+        """True while the worker works."""
+        return self.worker is not None and self.worker.running
+
+    def stop(self) -> None:
+        """Cancel what is running and give it a moment to end."""
+        if self.worker is not None:
+            self.worker.cancel()
+            self.worker.join(GRACE)
+            self.worker = None
+
+
+class CancelJob:
+    """Mixed into an operator that stops ``job``."""
+
+    job: Job
+    bl_options = {"INTERNAL"}
+
+    @classmethod
+    def poll(cls, context):
+        """Only while there is something to stop."""
+        return cls.job.running
+
+    def execute(self, context):
+        """Ask the worker to stop at its next step."""
+        self.job.worker.cancel()
+        redraw()
+        return {"FINISHED"}
 
 
 class ModalJob:

@@ -15,7 +15,7 @@ from ..jobs.plan import PlanReport, plan_scene
 from ..progress import Progress
 from .extract import extract_scene
 from .extract.volumes import is_volume
-from .modal_job import GRACE, ModalJob
+from .modal_job import CancelJob, Job, ModalJob
 from .motion import find_motion
 from .panels import draw_lines
 from .progress_text import bar_text
@@ -29,18 +29,13 @@ _MIB = 1 << 20
 _MOST_ROWS = 8
 
 
-class Plans:
+class Plans(Job):
     """The plan under way: ``worker`` with the scene it is ``planning`` for; and those that were made, by scene name."""
 
     def __init__(self):
-        self.worker: BakeWorker | None = None
+        super().__init__()
         self.planning = ""
         self.plans: dict[str, Plan] = {}
-
-    @property
-    def running(self) -> bool:
-        """True while something is measured."""
-        return self.worker is not None and self.worker.running
 
 
 plans = Plans()
@@ -104,23 +99,12 @@ class RTGI_OT_plan(ModalJob, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class RTGI_OT_cancel_plan(bpy.types.Operator):
+class RTGI_OT_cancel_plan(CancelJob, bpy.types.Operator):
     """Stop planning. An earlier plan is kept"""
 
     bl_idname = "rtgi.cancel_plan"
     bl_label = "Cancel Plan"
-    bl_options = {"INTERNAL"}
-
-    @classmethod
-    def poll(cls, context):
-        """Only while there is something to stop."""
-        return plans.running
-
-    def execute(self, context):
-        """Ask the worker to stop at its next step."""
-        plans.worker.cancel()
-        redraw()
-        return {"FINISHED"}
+    job = plans
 
 
 class RTGI_OT_apply_plan(bpy.types.Operator):
@@ -230,10 +214,7 @@ def register() -> None:
 
 def unregister() -> None:
     """Stop a running plan, give it a moment to end, and take everything out."""
-    if plans.worker is not None:
-        plans.worker.cancel()
-        plans.worker.join(GRACE)
-        plans.worker = None
+    plans.stop()
     plans.plans.clear()
     bpy.app.handlers.load_pre.remove(forget_plans)
     for cls in reversed(_CLASSES):

@@ -11,7 +11,7 @@ from ..jobs.stability import run_stability
 from ..progress import Progress
 from .bake_job import output_folder
 from .extract import extract_scene
-from .modal_job import GRACE, ModalJob
+from .modal_job import Job, ModalJob
 from .session import redraw, session
 from .translations import sentence
 from .worker import BakeWorker
@@ -21,19 +21,7 @@ _TEXT = "RTGI Stability"
 _items: list[tuple[str, str, str]] = []
 
 
-class Suite:
-    """The run under way: its ``worker``, None before the first."""
-
-    def __init__(self):
-        self.worker: BakeWorker | None = None
-
-    @property
-    def running(self) -> bool:
-        """True while something is measured."""
-        return self.worker is not None and self.worker.running
-
-
-suite = Suite()
+suite = Job()
 
 
 def _techniques(_self, _context):
@@ -143,9 +131,6 @@ def register() -> None:
 
 def unregister() -> None:
     """Stop a running test, give it a moment to end, and take everything out."""
-    if suite.worker is not None:
-        suite.worker.cancel()
-        suite.worker.join(GRACE)
-        suite.worker = None
+    suite.stop()
     for cls in reversed(_CLASSES):
         bpy.utils.unregister_class(cls)
