@@ -25,6 +25,7 @@ from ..scene import Scene
 from ..techniques import Field, Technique
 from ..techniques.base import KNOWN_LIGHT
 from ..techniques.probes.field import ProbeField
+from ..techniques.probes.placement import place
 from ..transport.context import LightContext
 from .costs import Costs, metered
 from .metrics import energy_ratio, leak_ratio, relative_rmse, relmse
@@ -103,8 +104,11 @@ class Yard:
                 cell_size(volume.world_from_local, volume.resolution).min() for volume in self.scene.volumes))
         if not len(self.receivers.points):
             raise BakeError("no surface can be seen from any probe", "move the Light Probe Volume to the geometry")
-        chosen = np.random.default_rng([seed, 0x7072]).permutation(len(self.usable))[:probes]
-        self.probe_rows = np.sort(self.usable[chosen])
+        # A bake moves probes off a wall that they lie on: what they hold is no answer for their lattice point.
+        unmoved = self.usable[~place(self.context, self.scene.volumes, True, Progress()).offset[self.usable].any(axis=1)]
+        comparable = unmoved if len(unmoved) else self.usable
+        chosen = np.random.default_rng([seed, 0x7072]).permutation(len(comparable))[:probes]
+        self.probe_rows = np.sort(comparable[chosen])
         self.probe_points = lattice[self.probe_rows].astype(np.float32)
         self.path_reference = PathReference(self.context, noise)
         self.reference = reference or self.path_reference

@@ -1,5 +1,7 @@
 """What a yard measures, held to a scene whose answer is known everywhere."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scene_builders as build
@@ -8,6 +10,7 @@ from rtgi_addon import techniques
 from rtgi_addon.errors import BakeError
 from rtgi_addon.evaluate.measure import PLACES, Yard, scaled_resolution
 from rtgi_addon.jobs.settings import build_settings
+from rtgi_addon.scene import Instance
 
 
 @pytest.fixture(scope="module")
@@ -61,6 +64,20 @@ def test_leaks_are_told_from_light_that_is_there():
     estimate = np.where(yard.dark[:, None], 0.5, 2.0) * np.ones((1, 3))
     errors = yard._errors("surface", estimate, techniques.get("probes"))
     assert errors.leak == pytest.approx(0.25) and errors.true_leak == 0.0
+
+
+def test_probes_that_a_bake_moves_are_not_compared_at_their_lattice_points():
+    """A lamp lights one side of a sheet on the middle plane of the lattice: a probe there stands on one side or the other."""
+    scene = build.closed_box(albedo=0.5, light_position=(0.3, 0.2, 0.6))
+    plate = build.plane("plate", 0.5)
+    scene = replace(scene, meshes=(*scene.meshes, plate), volumes=(build.volume(resolution=(3, 3, 3), half_size=0.9),),
+                    instances=(*scene.instances, Instance("plate", len(scene.meshes), np.eye(4))))
+    yard = Yard(scene, points=8, normals_per_point=1, probes=27, noise=0.05, threads=1)
+    middle = 13
+    assert middle not in yard.probe_rows and len(yard.probe_rows) >= 18
+    technique = techniques.get("probes")
+    run = yard.measure(technique, build_settings(technique, {"error": 0.03}), 1)
+    assert run.errors["probes"].error < 0.06
 
 
 def test_a_volumes_own_settings_do_not_stand_in_the_way():
