@@ -200,7 +200,9 @@ def test_the_command_does_what_it_says(command, folder):
 
 def recipe(target):
     """The commands of a target of the Makefile, without those of its set-up."""
-    said = subprocess.run(["make", "-n", target], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    # These tests may themselves run under make, which then says which folder it enters.
+    said = subprocess.run(["make", "--no-print-directory", "-n", target], cwd=ROOT, text=True, check=True,
+                          capture_output=True).stdout
     return [line for line in said.splitlines() if not line.startswith(("sh tools/setup.sh", "echo "))]
 
 
