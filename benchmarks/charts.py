@@ -46,7 +46,8 @@ def defaults() -> list[str]:
             for point in points:
                 plain = point["default"] or lattice != 1.0
                 if point["technique"] == technique and plain and point["lattice"] == lattice and point["accuracy"].get(place):
-                    return f"{100 * point['accuracy'][place]['spread']['error']['mean']:.2g} %"
+                    percent = 100 * point["accuracy"][place]["spread"]["error"]["mean"]
+                    return f"{percent:.0f} %" if percent >= 10 else f"{percent:.2g} %"
             return "–"
 
         cells = [error(name) for name in techniques] + [error("probes", lattice=2.0), error("probes", "probes")]
