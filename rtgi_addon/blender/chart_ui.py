@@ -16,8 +16,7 @@ from ..progress import Progress
 from .bake_job import output_folder
 from .extract import extract_scene
 from .modal_job import CancelJob, Job, ModalJob
-from .panels import draw_lines
-from .progress_text import bar_text
+from .panels import draw_job, draw_lines, draw_settings
 from .session import redraw, session
 from .translations import sentence
 from .worker import BakeWorker, duration
@@ -140,10 +139,7 @@ class RTGI_PT_chart(bpy.types.Panel):
         """The button or its progress, and the settings ranked by error."""
         layout, width = self.layout, context.region.width
         if charts.running:
-            report, stopping = charts.worker.report, charts.worker.progress.cancelled
-            row = layout.row(align=True)
-            row.progress(factor=report.fraction, type="BAR", text=bar_text(report, stopping), translate=False)
-            row.operator("rtgi.cancel_chart", text="", icon="CANCEL")
+            draw_job(layout, charts, "rtgi.cancel_chart")
         else:
             layout.operator("rtgi.chart", icon="GRAPH")
         known = charts.charts.get(context.scene.name)
@@ -152,7 +148,7 @@ class RTGI_PT_chart(bpy.types.Panel):
         chart, folder = known
         if not chart.complete and not charts.running:
             draw_lines(layout, iface_("Cancelled before the end"), width, "INFO")
-        _draw_ranking(layout, chart)
+        draw_settings(layout, iface_("Error"), ranking(chart), "SOLO_ON")
         draw_lines(layout, folder.name, width, "FILE_FOLDER")
 
 
@@ -166,16 +162,6 @@ def ranking(chart: Chart) -> list[tuple[bool, str, str, str]]:
         rows.append((index in front, f"{point.technique}, {point.label}", f"{100 * point.error():.2g}%",
                      f"{point.seconds.mean:.2g} s" if point.seconds.mean < 10 else duration(point.seconds.mean)))
     return rows
-
-
-def _draw_ranking(layout, chart: Chart) -> None:
-    column = layout.column(align=True)
-    for on_front, name, error, time in [(False, iface_("Setting"), iface_("Error"), iface_("Time")), *ranking(chart)]:
-        row = column.split(factor=0.62)
-        row.label(text=name, translate=False, icon="SOLO_ON" if on_front else "BLANK1")
-        cells = row.row()
-        cells.label(text=error, translate=False)
-        cells.label(text=time, translate=False)
 
 
 def _load_image(path: Path) -> None:

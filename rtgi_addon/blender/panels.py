@@ -21,6 +21,25 @@ _LETTER, _FEWEST_LETTERS = 6.6, 24
 _ICONS = {"error": "CANCEL", "warning": "ERROR", "note": "INFO"}
 
 
+def draw_job(layout, job, cancel: str) -> None:
+    """How far a running ``job`` (modal_job.Job) is, and the button of the operator that stops it."""
+    row = layout.row(align=True)
+    row.progress(factor=job.worker.report.fraction, type="BAR", translate=False,
+                 text=bar_text(job.worker.report, job.worker.progress.cancelled))
+    row.operator(cancel, text="", icon="CANCEL")
+
+
+def draw_settings(layout, error: str, rows: list[tuple[bool, str, str, str]], icon: str) -> None:
+    """A table of settings: name, error (``error`` is its heading) and time; ``icon`` before those that are marked."""
+    column = layout.column(align=True)
+    for marked, name, value, time in [(False, iface_("Setting"), error, iface_("Time")), *rows]:
+        row = column.split(factor=0.62)
+        row.label(text=name, translate=False, icon=icon if marked else "BLANK1")
+        cells = row.row()
+        cells.label(text=value, translate=False)
+        cells.label(text=time, translate=False)
+
+
 def draw_lines(layout, text: str, width: int, icon: str = "NONE") -> None:
     """``text``, in the user's language already, over as many labels as a region of ``width`` pixels needs; the icon stands before
     the first."""

@@ -17,8 +17,7 @@ from .extract import extract_scene
 from .extract.volumes import is_volume
 from .modal_job import CancelJob, Job, ModalJob
 from .motion import find_motion
-from .panels import draw_lines
-from .progress_text import bar_text
+from .panels import draw_job, draw_lines, draw_settings
 from .properties import attribute
 from .session import redraw, session
 from .translations import sentence
@@ -162,10 +161,7 @@ class RTGI_PT_plan(bpy.types.Panel):
         """The button or its progress, the plan's sentences, what else there is, and the button that applies it."""
         layout, width = self.layout, context.region.width
         if plans.running:
-            row = layout.row(align=True)
-            row.progress(factor=plans.worker.report.fraction, type="BAR", translate=False,
-                         text=bar_text(plans.worker.report, plans.worker.progress.cancelled))
-            row.operator("rtgi.cancel_plan", text="", icon="CANCEL")
+            draw_job(layout, plans, "rtgi.cancel_plan")
         else:
             layout.operator("rtgi.plan", icon="VIEWZOOM")
         plan = plans.plans.get(context.scene.name)
@@ -174,7 +170,7 @@ class RTGI_PT_plan(bpy.types.Panel):
         layout.operator("rtgi.apply_plan", icon="CHECKMARK")
         for line in plan.reasons:
             draw_lines(layout, sentence(line), width, "DOT")
-        _draw_options(layout, plan)
+        draw_settings(layout, iface_("Error below"), rows(plan), "CHECKMARK")
 
 
 def rows(plan: Plan) -> list[tuple[bool, str, str, str]]:
@@ -182,16 +178,6 @@ def rows(plan: Plan) -> list[tuple[bool, str, str, str]]:
     shown = [option for option in plan.options if not option.why_not][:_MOST_ROWS]
     return [(option.meets, f"{option.technique}, {option.label}, {size(option.resolutions)}", percent(upper(option.error)),
              f"{option.price.seconds:.2g} s") for option in shown]
-
-
-def _draw_options(layout, plan: Plan) -> None:
-    column = layout.column(align=True)
-    for meets, name, error, time in [(False, iface_("Setting"), iface_("Error below"), iface_("Time")), *rows(plan)]:
-        row = column.split(factor=0.62)
-        row.label(text=name, translate=False, icon="CHECKMARK" if meets else "BLANK1")
-        cells = row.row()
-        cells.label(text=error, translate=False)
-        cells.label(text=time, translate=False)
 
 
 @bpy.app.handlers.persistent

@@ -196,6 +196,13 @@ def test_size_does_not_matter_and_light_volumes_leak_more_than_virtual_lights(sm
     assert stability.measure(cases["leaks"], "lpv").figure > stability.measure(cases["leaks"], "vpl").figure
 
 
+def test_a_volume_that_no_surface_lies_in_is_not_said_to_hold(small_room):
+    """Receivers are those that its probes see, all of them outside it: moving the lattice then tells nothing."""
+    floating = replace(small_room, volumes=(parts.volume((-0.9, 0.5, 0.2), (-0.5, 0.9, 0.6), (2, 2, 2)),))
+    result = stability.measure(own_cases(floating)["phase"], "lpv")
+    assert result.verdict == ABOVE and result.worst.parameter.startswith("nothing was measured")
+
+
 def test_what_refuses_an_own_scene_is_reported_and_the_rest_goes_on(small_room, tmp_path, monkeypatch):
     def refuse(*_args, **_kwargs):
         raise BakeError("this technique will not", "choose another")
