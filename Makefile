@@ -1,10 +1,11 @@
 # `make demo` and `make test` set everything up first. RTGI_PYTHON=/path/to/python3.11 forces an interpreter.
 export RTGI_VENV ?= .venv
 PYTHON := $(RTGI_VENV)/bin/python
-PYTEST := $(PYTHON) -m pytest
+# One process a core: much of a test is Blender starting or Python thinking. A file's tests stay together, for the fixtures they share.
+PYTEST := $(PYTHON) -m pytest -n auto --dist loadfile
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-fast lint extension bench charts
+.PHONY: help setup demo test test-fast campaign lint extension bench charts
 
 help:                ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { sub(/ .*/, "", $$1); printf "make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -23,6 +24,9 @@ test: setup          ## run every test
 test-fast: setup     ## run the tests that take less than a few seconds each
 	$(PYTEST) -m "not slow"
 
+campaign: setup      ## try what must never be lost: kills, mutations, random command lines (an hour); CAMPAIGN="kills --count 99 --seed 7"
+	$(PYTHON) tests/campaign/run.py $(CAMPAIGN)
+
 lint: setup          ## check style
 	$(PYTHON) -m ruff check .
 
@@ -36,17 +40,16 @@ charts: setup        ## charts, sheets beside Cycles, plans and stability of eve
 	$(PYTHON) benchmarks/plan.py --threads 1
 
 bench: setup         ## measure again what benchmarks/README.md says
-	$(PYTHON) benchmarks/ray_rate.py
+	$(PYTHON) benchmarks/tables.py --minutes 600
 	$(PYTHON) benchmarks/without_embree.py
 	$(PYTHON) benchmarks/bake_vs_cycles.py
-	$(PYTHON) benchmarks/relight.py
-	$(PYTHON) benchmarks/scale.py
-	$(PYTHON) benchmarks/technique_errors.py
+	$(PYTHON) benchmarks/farm.py atrium --probes 20000 --parts 16 --error 0.03 --workers 4
+	$(PYTHON) benchmarks/farm.py --merge 1000000
+	$(PYTHON) benchmarks/lookup.py
+	$(PYTHON) benchmarks/fit.py
 	$(PYTHON) benchmarks/plan.py
-	$(PYTHON) benchmarks/vpl.py
-	$(PYTHON) benchmarks/lpv.py
+	$(PYTHON) benchmarks/vpl.py accuracy flicker
 	$(PYTHON) benchmarks/rsm_capture.py
 	$(PYTHON) benchmarks/gpu_kernels.py
-	$(PYTHON) benchmarks/linear_cost.py
 	$(PYTHON) benchmarks/preview.py
 	$(PYTHON) benchmarks/preview_vs_cycles.py

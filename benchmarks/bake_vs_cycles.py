@@ -4,7 +4,7 @@
 
 Both sides start from the open file and end with SH in memory, set-up included: for the bake that is extraction, BVH, surface
 cache and probes; for Cycles the time from the first render call, the file reopened before each measurement so that nothing is
-left over. Cycles renders as rtgi_addon/blender/cycles_reference.py does it: by default the fastest way found, the tiles of all
+left over. Cycles renders as rtgi_addon/blender/cycles/reference.py does it: by default the fastest way found, the tiles of all
 probes in one picture through an OSL camera, or with `--method panorama` as people do it today, one equirectangular render a
 probe. Blue-noise sampling, light tree, no denoising and no path guiding (which made these scenes slower).
 
@@ -31,7 +31,7 @@ sys.path.insert(0, str(ROOT))
 
 from rtgi_addon import techniques  # noqa: E402
 from rtgi_addon.blender.cli.streams import Streams  # noqa: E402
-from rtgi_addon.blender.cycles_reference import CyclesSettings, points_in_the_open, render_probes, volume_points  # noqa: E402
+from rtgi_addon.blender.cycles.reference import CyclesSettings, points_in_the_open, render_probes, volume_points  # noqa: E402
 from rtgi_addon.blender.extract import extract_scene  # noqa: E402
 from rtgi_addon.evaluate.metrics import relative_rmse  # noqa: E402
 from rtgi_addon.progress import Progress  # noqa: E402
@@ -47,7 +47,7 @@ TILE, BOUNCES = 32, 64
 def open_sample(name: str, probes: int) -> bpy.types.Object:
     """Open a sample and give its volume ``probes`` samples in cells as even as can be."""
     bpy.ops.wm.open_mainfile(filepath=str(ROOT / "sample_blends" / f"{name}.blend"))
-    volume = next(obj for obj in bpy.context.scene.objects if obj.type == "LIGHT_PROBE")
+    volume = next(obj for obj in bpy.context.scene.objects if obj.type == "LIGHT_PROBE" and obj.data.type == "VOLUME")
     data = volume.data
     data.resolution_x, data.resolution_y, data.resolution_z = even_resolution(probes, np.array(volume.scale))
     bpy.context.view_layer.update()

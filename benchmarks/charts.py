@@ -1,4 +1,5 @@
-"""Charts of speed against accuracy, tables and error maps of the samples, into benchmarks/results/charts/SAMPLE.
+"""Charts of speed against accuracy of techniques and of effects' pictures, tables and error maps of the samples, into
+benchmarks/results/charts/SAMPLE.
 
     python benchmarks/charts.py [SAMPLE …] [--seeds N] [--noise E] [--threads N]
 
@@ -55,16 +56,35 @@ def defaults() -> list[str]:
     return [*lines, ""]
 
 
+def effects() -> list[str]:
+    """A table of the pictures of every sample that was charted: each effect at its defaults, and the picture without it."""
+    rows = []
+    for path in sorted(RESULTS.glob("*/chart.json")):
+        for point in (json.loads(path.read_text()).get("pictures") or {"points": []})["points"]:
+            if point["default"] or point["label"] == "without":
+                # A named tuple is a list in JSON: samples, seconds, CPU seconds, error, bias.
+                _, seconds, cpu, error, bias = point["steps"][-1]
+                rows.append(f"| {path.parent.name} | {point['effect']}, {point['label']} | {100 * error:.1f} % | "
+                            f"{100 * point['coarse']:.1f} % | {100 * bias:+.1f} % | {seconds:.1f} | {cpu:.1f} |")
+    if not rows:
+        return []
+    return ["Error of the picture against Cycles after 16 samples (*coarse*: of means over 4 × 4 pixels):", "",
+            "| sample | effect | error | coarse | bias | time [s] | CPU [s] |", "|---|---|---:|---:|---:|---:|---:|", *rows, ""]
+
+
 def index() -> str:
     """Markdown of every chart that is there."""
     lines = ["# Speed against accuracy, every sample", "",
              "Made by `make charts`. Towards the lower left is better; on the black line lie the settings that no other beats in "
-             "both time and error. Tables with every figure are behind the titles.", "", *defaults()]
+             "both time and error. Every figure is behind the titles. Below each: pictures with effects, held to Cycles.", "",
+             *defaults(), *effects()]
     for path in sorted(RESULTS.glob("*/chart.md")):
         name = path.parent.name
         taken = path.with_name("seconds.json")
         seconds = f" ({json.loads(taken.read_text())['seconds']:.0f} s to measure)" if taken.exists() else ""
         lines += [f"## [{name}]({name}/chart.md){seconds}", "", f"![{name}]({name}/chart.png)", ""]
+        if path.with_name("effects.png").exists():
+            lines += [f"![effects of {name}]({name}/effects.png)", ""]
     return "\n".join(lines)
 
 

@@ -24,13 +24,13 @@ from shadow_maps import prepared  # noqa: E402
 from benchmarks.bare_gl import BareContext  # noqa: E402
 from rtgi_addon.preview import programs  # noqa: E402
 from rtgi_addon.preview.atlas import Atlas  # noqa: E402
-from rtgi_addon.preview.packing import FLUX_SCALE, face_blocks, fold, light_rows, map_texels, unfold  # noqa: E402
+from rtgi_addon.preview.packing import FLUX_SCALE, face_blocks, fold, light_rows, map_texels, step_values, unfold  # noqa: E402
 from rtgi_addon.techniques.lpv.geometry_volume import Surfels, face_blocking, inject_surfels  # noqa: E402
-from rtgi_addon.techniques.lpv.grid import SIDE_AHEAD, LpvGrid  # noqa: E402
+from rtgi_addon.techniques.lpv.grid import LpvGrid  # noqa: E402
 from rtgi_addon.techniques.lpv.propagation import propagate  # noqa: E402
 from rtgi_addon.techniques.rsm.gather import Pattern, gather, rotations  # noqa: E402
 from rtgi_addon.techniques.vpl.gather import gather_visible  # noqa: E402
-from rtgi_addon.transport.virtual_lights import VirtualLights  # noqa: E402
+from rtgi_addon.techniques.vpl.virtual_lights import VirtualLights  # noqa: E402
 
 CHANNELS = ("red", "green", "blue")
 
@@ -76,12 +76,11 @@ def propagation(bare: BareContext, cells: int, steps: int, repeats: int) -> str:
     surfels = Surfels(rng.random((count, 3)) * cells, unit(rng, count), rng.random(count), rng.random((count, 3)))
     blocking, atlas = face_blocking(inject_surfels(grid, surfels)), Atlas.of(grid.resolution)
     light = rng.random((4, 3, cells, cells, cells), dtype=np.float32)
-    faces, blockers = (bare.upload(texels) for texels in face_blocks(atlas, blocking))
+    faces, blockers, kept = (bare.upload(texels) for texels in face_blocks(atlas, blocking))
     first = [bare.upload(atlas.pack(np.moveaxis(light[:, channel], 0, -1) * FLUX_SCALE)) for channel in range(3)]
     spare = [[bare.empty(*atlas.size) for _ in CHANNELS] for _ in range(2)]
     total = [bare.empty(*atlas.size) for _ in CHANNELS]
-    values = {"resolution": grid.resolution, "columns": atlas.columns, "size": atlas.size, "side_ahead": SIDE_AHEAD, "bounces": 1,
-              "accumulate": 1}
+    values = {**step_values(atlas, blocking), "accumulate": 1}
 
     def work():
         current = first
@@ -91,7 +90,7 @@ def propagation(bare: BareContext, cells: int, steps: int, repeats: int) -> str:
                       for i, name in enumerate(CHANNELS)}
             bare.dispatch(programs.LPV_PROPAGATE, atlas.size, uniforms={"parameters": values}, images=images,
                           samplers={**{f"light_{name}": current[i] for i, name in enumerate(CHANNELS)}, "faces": faces,
-                                    "blockers": blockers})
+                                    "blockers": blockers, "kept": kept})
             current = following
 
     gpu = on_gpu(bare, repeats, work)
@@ -99,7 +98,8 @@ def propagation(bare: BareContext, cells: int, steps: int, repeats: int) -> str:
     # The image sums up over all runs: start it again for the comparison.
     total[:] = [bare.empty(*atlas.size) for _ in CHANNELS]
     work()
-    found = np.stack([np.moveaxis(atlas.unpack(bare.download(part)) / FLUX_SCALE, -1, 0) for part in total], axis=1) + light
+    found = np.stack([np.moveaxis(atlas.unpack(bare.download(part)) / FLUX_SCALE, -1, 0) for part in total], axis=1)
+    found += light * blocking.area.reshape(grid.shape)
     return row(f"LPV propagation, {cells}³ cells, {steps} steps, blocking", gpu, cpu,
                np.abs(found - expected).max() / expected.max())
 

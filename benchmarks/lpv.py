@@ -23,15 +23,16 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests/support")]
 import room_scenes as rooms  # noqa: E402
 import scene_builders as build  # noqa: E402
 
+from rtgi_addon.techniques.lpv.crossings import trace_faces  # noqa: E402
 from rtgi_addon.techniques.lpv.gather import gather  # noqa: E402
-from rtgi_addon.techniques.lpv.geometry_volume import face_blocking, inject_surfels, vacuum  # noqa: E402
+from rtgi_addon.techniques.lpv.geometry_volume import face_blocking, vacuum  # noqa: E402
 from rtgi_addon.techniques.lpv.grid import LpvGrid  # noqa: E402
 from rtgi_addon.techniques.lpv.injection import inject  # noqa: E402
 from rtgi_addon.techniques.lpv.propagation import propagate  # noqa: E402
 from rtgi_addon.techniques.lpv.surfels import peel  # noqa: E402
 from rtgi_addon.transport.context import LightContext  # noqa: E402
-from rtgi_addon.transport.reflective_shadow_map import capture  # noqa: E402
-from rtgi_addon.transport.shadow_views import views_of  # noqa: E402
+from rtgi_addon.transport.views.reflective_shadow_map import capture  # noqa: E402
+from rtgi_addon.transport.views.shadow_views import views_of  # noqa: E402
 
 HELD_TO = 60.0
 RECEIVERS = 100_000
@@ -60,10 +61,10 @@ class Room:
         self.grid = LpvGrid((-1.1,) * 3, 2.2 / resolution, (resolution,) * 3)
         texels = [capture(context, view).lights() for view in views_of(context, 0, 128)]
         self.lights = tuple(np.concatenate(columns) for columns in zip(*(part[:3] for part in texels), strict=True))
-        self.surfels = peel(context, self.grid)
-        self.geometry = inject_surfels(self.grid, self.surfels)
-        self.injected = inject(self.grid, *self.lights)
+        self.context, self.surfels = context, peel(context, self.grid)
+        self.geometry = trace_faces(context, self.grid, self.surfels)
         self.blocking = face_blocking(self.geometry)
+        self.injected = inject(self.grid, *self.lights, self.blocking.faces)
 
     def propagate(self, steps: int, threads: int) -> np.ndarray:
         """The accumulated volume."""
@@ -91,14 +92,15 @@ def main() -> None:
     normals = rng.normal(size=(RECEIVERS, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     parts = {
-        f"inject {len(room.lights[0]):,} lights": lambda: inject(room.grid, *room.lights),
-        f"inject {len(room.surfels.area):,} surfels": lambda: inject_surfels(room.grid, room.surfels),
+        f"inject {len(room.lights[0]):,} lights": lambda: inject(room.grid, *room.lights, room.blocking.faces),
+        f"trace the faces near {len(room.surfels.area):,} surfels": lambda: trace_faces(room.context, room.grid, room.surfels),
         "faces, with bounces": lambda: face_blocking(room.geometry),
         "faces, blocking alone": lambda: face_blocking(room.geometry, bounces=False),
         f"{steps} steps, blocking and bounces": lambda: room.propagate(steps, threads),
         f"{steps} steps, blocking alone": lambda: propagate(room.injected, without, steps, threads=threads),
         f"{steps} steps, vacuum": lambda: propagate(room.injected, empty, steps, threads=threads),
-        f"gather at {RECEIVERS:,} points": lambda: gather((room.grid,), (accumulated,), points, normals),
+        f"gather at {RECEIVERS:,} points": lambda: gather((room.grid,), (accumulated,), points, normals,
+                                                                       faces=(room.blocking.faces,)),
     }
     times = {name: milliseconds(work, options.repeats) for name, work in parts.items()}
     whole = times["faces, blocking alone"] + times[f"{steps} steps, blocking alone"]

@@ -7,7 +7,8 @@ file's resolution of FACTORS, from coarse to fine until one meets the error (a f
 has more than MOST_PROBES. All are held to the path tracer at the same surface points, which the plan did not see, with its noise
 taken out. Cost is CPU time of the bake, all threads together, the less of two runs: other work on the machine hardly changes it.
 A planned bake passes if its error is within the target, or above it by less than the points can tell (one-sided, 90 %), and if it
-costs at most LIMIT times the cheapest of the search that is within the target. Writes benchmarks/results/plan.json after each
+costs at most LIMIT times the cheapest of the search that is within the target. *Together* is what the plan and a bake that goes on
+with its ray tracer and its surface cache cost, relative to the planned bake alone. Writes benchmarks/results/plan.json after each
 sample, beside what is there of others, and prints the table of all.
 """
 
@@ -28,7 +29,7 @@ from rtgi_addon.evaluate.costs import metered  # noqa: E402
 from rtgi_addon.evaluate.measure import scaled_resolution  # noqa: E402
 from rtgi_addon.evaluate.plan import Target, make_plan  # noqa: E402
 from rtgi_addon.evaluate.plan.sample import draw_sample  # noqa: E402
-from rtgi_addon.evaluate.plan.search import upper  # noqa: E402
+from rtgi_addon.evaluate.plan.tries import upper  # noqa: E402
 from rtgi_addon.evaluate.references import PathReference  # noqa: E402
 from rtgi_addon.jobs.plan import HELD_BACK  # noqa: E402
 from rtgi_addon.progress import Progress  # noqa: E402
@@ -60,13 +61,15 @@ class Yard:
         self.sample = draw_sample(context, scene.volumes, points, HELD_BACK)
         self.truth = PathReference(context, noise).irradiance(self.sample.receivers, Progress())
 
-    def bake(self, scene: Scene, settings: dict, repeats: int = 2) -> tuple:
-        """Error, CPU seconds and wall-clock seconds of probes with ``settings`` on the lattices of ``scene``."""
+    def bake(self, scene: Scene, settings: dict, repeats: int = 2, begun=None) -> tuple:
+        """Error, CPU seconds and wall-clock seconds of probes with ``settings`` on the lattices of ``scene``; ``begun`` is what a
+        plan has done of it."""
         method = techniques.get("probes")
         costs = []
         for _ in range(repeats):
             with metered() as cost:
-                field = method.bake(scene, method.Settings(**settings), np.random.default_rng(0), Progress(), threads=self.threads)
+                field = method.bake(scene, method.Settings(**settings), np.random.default_rng(0), Progress(), threads=self.threads,
+                                    begun=begun)
             costs.append(cost)
         receivers = self.sample.receivers
         return (self.sample.error(field.irradiance(receivers.points, receivers.normals), self.truth),
@@ -101,7 +104,7 @@ def measure(name: str, options: argparse.Namespace) -> dict:
     """Everything about one sample."""
     scene = read(name)
     yard = Yard(scene, options.points, options.noise, options.threads)
-    grid = search(yard, options.error)
+    grid = [] if options.no_search else search(yard, options.error)
     within = [one for one in grid if one["error"] <= options.error]
     cheapest = min(within, key=lambda one: one["cpu"]) if within else None
     plans = []
@@ -109,35 +112,40 @@ def measure(name: str, options: argparse.Namespace) -> dict:
         started = process_time()
         plan = make_plan(scene, Target(options.error), seed=seed, others=False, threads=options.threads)
         plan_cpu = process_time() - started
+        _, after, _, _ = yard.bake(plan.applied(scene), plan.settings, 1, plan.found.reading.pilot.begun)
         error, cpu, seconds, rays = yard.bake(plan.applied(scene), plan.settings)
         plans.append({
             "seed": seed, "met": plan.met, "settings": plan.settings, "resolutions": [volume.resolution for volume in plan.volumes],
             "probes": plan.probes, "kept": plan.kept, "predicted": plan.chosen.error.value, "bound": upper(plan.chosen.error),
             "error": error.value, "standard_error": error.standard_error, "cpu": cpu, "seconds": seconds, "rays": rays,
             "predicted_rays": plan.chosen.price.rays, "predicted_seconds": plan.chosen.price.seconds, "plan_cpu": plan_cpu,
-            "plan_seconds": plan.seconds, "ratio": cpu / cheapest["cpu"] if cheapest else None,
+            "plan_seconds": plan.seconds, "together": (plan_cpu + after) / cpu,
+            "ratio": cpu / cheapest["cpu"] if cheapest else None,
             "keeps_error": 2.0 * error.value - upper(error) <= options.error})
     return {"sample": name, "target": options.error, "points": yard.sample.points, "noise": yard.truth.noise, "cheapest": cheapest,
-            "best": min(one["error"] for one in grid), "plans": plans, "grid": grid}
+            "best": min((one["error"] for one in grid), default=None), "plans": plans, "grid": grid}
 
 
 def table(results: list[dict]) -> str:
     """Markdown of what was measured."""
     lines = ["| sample | planned (order, rays to) | predicted | found | bake, CPU [s] | cheapest of the search | its CPU [s] | "
-             "ratio | plan, CPU [s] |", "|---|---|---:|---:|---:|---|---:|---:|---:|"]
+             "ratio | plan, CPU [s] | together |", "|---|---|---:|---:|---:|---|---:|---:|---:|---:|"]
     for result in results:
         for plan in result["plans"]:
             lattice = ", ".join(" x ".join(map(str, resolution)) for resolution in plan["resolutions"])
             best = result["cheapest"]
             other = f"x {best['factor']:g}, order {best['order']}, {100 * best['ray_error']:g} %" if best else \
-                f"none ({100 * result['best']:.1f} % at best)"
+                "not searched" if result["best"] is None else f"none ({100 * result['best']:.1f} % at best)"
             ratio, spent = (f"{plan['ratio']:.2f}", f"{best['cpu']:.2f}") if best else ("-", "-")
             short = "" if plan["met"] else ", target said to be out of reach"
             settings = f"{plan['settings']['order']}, {100 * plan['settings']['error']:g} %"
             lines.append(
                 f"| {result['sample']} | {lattice} ({settings}){short} "
                 f"| {100 * plan['predicted']:.1f} % | {100 * plan['error']:.1f} ± {100 * plan['standard_error']:.1f} % "
-                f"| {plan['cpu']:.2f} | {other} | {spent} | {ratio} | {plan['plan_cpu']:.1f} |")
+                f"| {plan['cpu']:.2f} | {other} | {spent} | {ratio} | {plan['plan_cpu']:.2f} "
+                f"| {plan['together']:.2f} |")
+    together = [plan["together"] for result in results for plan in result["plans"]]
+    lines.append(f"| geometric mean |{' |' * 8} {np.exp(np.mean(np.log(together))):.2f} |")
     return "\n".join(lines)
 
 
@@ -150,8 +158,10 @@ def main() -> int:
     parser.add_argument("--noise", type=float, default=0.06, help="of the reference, which is taken out (default 0.06)")
     parser.add_argument("--threads", type=int, help="default: every core")
     parser.add_argument("--seeds", type=int, nargs="+", default=[0], help="of the plans (default 0)")
+    parser.add_argument("--no-search", action="store_true", help="plan and bake alone")
     parser.add_argument("--table", action="store_true", help="measure nothing, print the table of what was measured before")
     options = parser.parse_args()
+    RESULTS.parent.mkdir(exist_ok=True)
     stored = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
     for name in () if options.table else options.samples:
         stored[name] = measure(name, options)

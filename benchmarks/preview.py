@@ -27,12 +27,12 @@ sys.path.insert(0, str(ROOT))
 
 from rtgi_addon.blender.extract import extract_scene  # noqa: E402
 from rtgi_addon.jobs.field import bake_field  # noqa: E402
-from rtgi_addon.preview.camera_view import CameraView  # noqa: E402
 from rtgi_addon.preview.settings import PreviewSettings  # noqa: E402
 from rtgi_addon.scene import Camera, Scene  # noqa: E402
 from rtgi_addon.techniques import Field  # noqa: E402
 from rtgi_addon.transport.context import LightContext  # noqa: E402
 from rtgi_addon.transport.vectors import dot  # noqa: E402
+from rtgi_addon.transport.views.camera import CameraView  # noqa: E402
 
 TECHNIQUES = ("probes", "vpl", "rsm", "lpv")
 PARTS = ("gbuffer", "direct", "indirect", "film")

@@ -38,7 +38,7 @@ sys.path.insert(0, str(ROOT))
 
 from benchmarks.preview import seen_by  # noqa: E402
 from rtgi_addon.blender.cli.streams import Streams  # noqa: E402
-from rtgi_addon.blender.cycles_reference import CyclesSettings, rendering  # noqa: E402
+from rtgi_addon.blender.cycles.reference import CyclesSettings, rendering  # noqa: E402
 from rtgi_addon.blender.extract import extract_scene  # noqa: E402
 from rtgi_addon.blender.gpu_context import open_context  # noqa: E402
 from rtgi_addon.evaluate.receivers import Receivers  # noqa: E402
@@ -47,7 +47,7 @@ from rtgi_addon.jobs.field import bake_field  # noqa: E402
 from rtgi_addon.preview.settings import PreviewSettings  # noqa: E402
 from rtgi_addon.scene import Scene  # noqa: E402
 from rtgi_addon.transport.context import LightContext  # noqa: E402
-from rtgi_addon.transport.rays import offset_origins  # noqa: E402
+from rtgi_addon.transport.rays.tracer import offset_origins  # noqa: E402
 from rtgi_addon.transport.vectors import luminance  # noqa: E402
 
 RESULTS = ROOT / "benchmarks/results"
@@ -92,8 +92,8 @@ def render_rtgi(name: str, size, density: float, samples: int, threads: int | No
                 measured: bool = True) -> dict:
     """Passes (h, w, 3), row 0 at the top, which pixels show a surface, seconds, and if ``measured`` the difference of the field to
     ``held`` (what ``field_truth`` returns, made here for None)."""
-    from rtgi_addon.preview.camera_view import CameraView
     from rtgi_addon.preview.renderer import PreviewRenderer
+    from rtgi_addon.transport.views.camera import CameraView
     open_sample(name, size, density)
     started = time.perf_counter()
     scene = extract_scene()

@@ -33,7 +33,7 @@ sys.path.insert(0, str(ROOT))
 from rtgi_addon import techniques  # noqa: E402
 from rtgi_addon.blender.cli.open_file import open_file  # noqa: E402
 from rtgi_addon.blender.cli.streams import Streams  # noqa: E402
-from rtgi_addon.blender.cycles_reference import CyclesSettings, points_in_the_open, render_probes  # noqa: E402
+from rtgi_addon.blender.cycles.reference import CyclesSettings, points_in_the_open, render_probes  # noqa: E402
 from rtgi_addon.blender.extract import extract_scene  # noqa: E402
 from rtgi_addon.errors import BakeError  # noqa: E402
 from rtgi_addon.evaluate.metrics import relative_rmse, signed_bias  # noqa: E402
@@ -42,7 +42,7 @@ from rtgi_addon.progress import Progress  # noqa: E402
 from rtgi_addon.scene import Channel  # noqa: E402
 from rtgi_addon.scene.checks import check_scene, require  # noqa: E402
 from rtgi_addon.transport.context import LightContext  # noqa: E402
-from rtgi_addon.transport.path import probe_sh  # noqa: E402
+from rtgi_addon.transport.paths.reference import probe_sh  # noqa: E402
 
 # Inputs of shader nodes that make a surface shine or bump, and what switches each off.
 GLOSS = {"Metallic": 0.0, "Specular IOR Level": 0.0, "Coat Weight": 0.0, "Sheen Weight": 0.0, "Transmission Weight": 0.0,

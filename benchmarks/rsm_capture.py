@@ -3,7 +3,7 @@
     python benchmarks/rsm_capture.py [--samples cornell_box sun_window atrium …] [--resolution 512] [--repeats 7] [--threads N]
     blender -b --python benchmarks/rsm_capture.py -- [the same]
 
-Every sample's first lamp, its first view. By rays: `transport.reflective_shadow_map.capture`, with the rate of its rays. By
+Every sample's first lamp, its first view. By rays: `transport.views.reflective_shadow_map.capture`, with the rate of its rays. By
 rasterization: the kernel of `--device gpu`, from arrays to arrays, so that what is sent to and fetched from the GPU counts; the
 scene's triangles are sent before the clock starts. The last column is the share of texels on which both meet the same triangle.
 Without a GPU context the table ends with the reason. Prints Markdown; medians over repeats.
@@ -28,7 +28,7 @@ from rtgi_addon.preview import context as gpu_state  # noqa: E402
 from rtgi_addon.preview.kernels import GpuKernels  # noqa: E402
 from rtgi_addon.techniques.kernels import NUMPY  # noqa: E402
 from rtgi_addon.transport.context import LightContext  # noqa: E402
-from rtgi_addon.transport.shadow_views import views_of  # noqa: E402
+from rtgi_addon.transport.views.shadow_views import views_of  # noqa: E402
 
 SAMPLES = ("cornell_box", "two_rooms", "sun_window", "corridor_door_ajar", "many_lights", "atrium")
 

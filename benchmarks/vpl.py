@@ -24,14 +24,14 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from rtgi_addon import techniques  # noqa: E402
+from rtgi_addon import kernels, techniques  # noqa: E402
 from rtgi_addon.blender.extract import extract_scene  # noqa: E402
 from rtgi_addon.progress import Progress  # noqa: E402
 from rtgi_addon.techniques.vpl.gather import gather  # noqa: E402
-from rtgi_addon.transport import rays  # noqa: E402
 from rtgi_addon.transport.context import LightContext  # noqa: E402
 from rtgi_addon.transport.parallel import parallel_for, thread_count  # noqa: E402
-from rtgi_addon.transport.path import irradiance_at  # noqa: E402
+from rtgi_addon.transport.paths.reference import irradiance_at  # noqa: E402
+from rtgi_addon.transport.rays import embree as rays  # noqa: E402
 from rtgi_addon.transport.vectors import dot  # noqa: E402
 
 SAMPLES = ("cornell_box", "two_rooms", "sun_window", "corridor_door_ajar")
@@ -94,7 +94,10 @@ def rate(name: str, threads: int, runs: int) -> str:
     def whole():
         gather(context, lights, points, normals, threads=threads)
 
-    calls, tracer = record(whole), getattr(context.tracer, "_tracer", context.tracer)
+    with kernels.switched_off():
+        plain = LightContext(scene, threads)
+        calls = record(lambda: gather(plain, lights, points, normals, threads=threads))
+    tracer = getattr(plain.tracer, "_tracer", plain.tracer)
     traced = sum(len(call[0]) for call in calls)
     seconds, bare = [], []
     for _ in range(runs):

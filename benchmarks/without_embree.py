@@ -22,8 +22,8 @@ from rtgi_addon import techniques  # noqa: E402
 from rtgi_addon.blender.extract import extract_scene  # noqa: E402
 from rtgi_addon.jobs.settings import build_settings  # noqa: E402
 from rtgi_addon.progress import Progress  # noqa: E402
-from rtgi_addon.transport import rays  # noqa: E402
 from rtgi_addon.transport.parallel import thread_count  # noqa: E402
+from rtgi_addon.transport.rays import embree as rays  # noqa: E402
 
 
 def seconds(scene, count: int, threads: int) -> float:

@@ -1,4 +1,6 @@
-"""RTGI: bake, preview, measure and ship real-time global illumination from Blender.
+"""RTGI: bake, preview, measure and ship real-time global illumination from Blender. Folders have ranks and import strictly lower
+ones (tests/test_layers.py holds the list); what is new comes in as low as what it needs allows, and here comes nothing but the
+door.
 
 Importing this package imports neither Blender nor any dependency, so light transport runs under a plain Python as well.
 """

@@ -21,6 +21,15 @@ class UsageError(BakeError):
     """The call itself is wrong: an unknown option, technique or volume. The shell answers with exit code 2 for options."""
 
 
+def out_of_memory(error: BaseException) -> BakeError | None:
+    """What to tell the user if ``error`` says that there was no memory, or no room for a thread; None for any other."""
+    if not isinstance(error, MemoryError) and not (isinstance(error, RuntimeError) and "can't start new thread" in str(error)):
+        return None
+    what = " ".join(str(error).split())
+    return BakeError(f"there is not enough memory ({what or 'an array did not fit'})",
+                     "close other programs, raise the limit if one is set, or lower resolution, order and sizes of images")
+
+
 class Cancelled(Exception):
     """Raised by ``Progress.step`` once the user has asked to stop. Never an error: the last bake stays whole.
 

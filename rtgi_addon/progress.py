@@ -2,8 +2,12 @@
 
 import threading
 import time
+from collections import deque
 
 from .errors import Cancelled
+
+# The latest part of the work that says how long the rest will take: this share of the time so far, and so many seconds at least.
+_LATEST, _LATEST_SECONDS = 0.4, 3.0
 
 
 class Progress:
@@ -20,6 +24,7 @@ class Progress:
         self._cancelled = threading.Event()
         self._started = time.monotonic()
         self._last = self._furthest = 0.0
+        self._paces: deque[tuple[float, float]] = deque([(self._started, 0.0)])
         self._span = (0.0, 1.0)
         self._parent = None
         self.stage_seconds: dict[str, float] = {}
@@ -67,14 +72,33 @@ class Progress:
         if self._report is None or (now - self._last < self._interval and fraction < 1.0):
             return
         self._last = now
+        self._report(overall, label, self._seconds_left(overall, now))
+
+    def _seconds_left(self, overall: float, now: float) -> float | None:
+        """By the pace of the latest part of the work, which says more of the rest than its beginning; None while there is none."""
+        self._paces.append((now, overall))
         elapsed = now - self._started
-        seconds_left = elapsed * (1.0 - overall) / overall if overall > 0.01 else None
-        self._report(overall, label, seconds_left)
+        while len(self._paces) > 2 and self._paces[1][0] <= now - max(_LATEST_SECONDS, _LATEST * elapsed):
+            self._paces.popleft()
+        if overall <= 0.01:
+            return None
+        then, fraction = self._paces[0]
+        if overall > fraction and now > then:
+            # Half by the whole so far: a short stage at another pace must not make the time left jump.
+            recent = (now - then) / (overall - fraction)
+            return (1.0 - overall) * 0.5 * (recent + elapsed / overall)
+        return elapsed * (1.0 - overall) / overall
 
     def span(self, low: float, high: float) -> "Progress":
         """A child whose 0 to 1 covers ``low`` to ``high`` of this one; cancel and stages are shared."""
         child = Progress()
         child._parent, child._span = self, (low, high)
+        return child
+
+    def apart(self) -> "Progress":
+        """A child over all of this one with stages of its own; cancel is shared."""
+        child = Progress(lambda fraction, label, _left: self.step(fraction, label), interval=0.0)
+        child._cancelled = self._root()._cancelled
         return child
 
     def _root(self) -> "Progress":

@@ -1,6 +1,8 @@
-"""The architecture as a test: imports go down, outside packages have one owner, modules stay small, the public is documented."""
+"""The architecture as a test: imports go down and never in circles, outside packages have one owner, modules stay small, the
+public is documented."""
 
 import ast
+import re
 import sys
 from pathlib import Path
 
@@ -12,21 +14,25 @@ PACKAGE = "rtgi_addon"
 # A module may import strictly lower ranks and its own folder. Modules beside the folders that are not named here (register,
 # the command-line entry) stand on top of everything.
 RANKS = {
-    "errors": -1, "progress": -1, "numerics": 0, "scene": 1, "transport": 2, "techniques": 3, "passes": 3, "exchange": 4,
-    "evaluate": 4, "preview": 4, "jobs": 5, "blender": 6,
+    "errors": -1, "progress": -1, "words": -1, "interrupts": -1, "discovery": -1, "kernels": -1,
+    "numerics": 0, "machine": 0, "storage": 0, "scene": 1,
+    "transport": 2, "techniques": 3, "effects": 4, "exchange": 5, "evaluate": 5, "preview": 5, "jobs": 6,
+    "blender": 7,
 }
-TOP = 7
-LEAVES = {"errors", "progress"}
+TOP = 8
+# Within transport: a wing imports strictly lower wings and itself. What is not named here (parallel, vectors) is everybody's.
+WINGS = {"surfaces": 1, "rays": 2, "lights": 2, "media": 3, "context": 4, "paths": 5, "cache": 6, "views": 6, "voxels": 6}
+LEAVES = {"errors", "progress", "words", "interrupts", "discovery"}
 
 # Who may import what from outside; numpy and the standard library are everybody's.
 OWNERS = {
     "bpy": {"blender"}, "_cycles": {"blender"}, "bpy_extras": {"blender"}, "bmesh": {"blender"}, "addon_utils": {"blender"},
     "bpy_types": {"blender"}, "bl_operators": {"blender"}, "bl_ui": {"blender"},
     "mathutils": {"blender", "transport"}, "gpu": {"preview"}, "gpu_extras": {"preview"}, "blf": {"preview"},
-    "matplotlib": {"evaluate"}, "embreex": {"transport"},
+    "matplotlib": {"evaluate"}, "embreex": {"transport"}, "distributed": {"jobs"},
 }
 # Heavy, and not there in Blender: imported inside the function that draws.
-LATE = {"matplotlib"}
+LATE = {"matplotlib", "distributed"}
 
 
 def modules():
@@ -34,9 +40,21 @@ def modules():
     return sorted((ROOT / PACKAGE).rglob("*.py"))
 
 
+def named(path):
+    """A file's dotted module as parts, and whether it is a package."""
+    parts = list(path.relative_to(ROOT).with_suffix("").parts)
+    is_package = parts[-1] == "__init__"
+    return parts[:-1] if is_package else parts, is_package
+
+
 def folder_of(parts):
     """The ranked name a dotted module belongs to: its folder, or the module itself right below the package."""
     return parts[1] if len(parts) > 1 else "__init__"
+
+
+def wing_of(parts):
+    """The folder or module right below the ranked folder that a dotted module belongs to."""
+    return parts[2] if len(parts) > 2 else "__init__"
 
 
 def imports(source, module, is_package):
@@ -77,6 +95,9 @@ def faults(source, module, is_package=False):
             other = folder_of(target)
             # Version, name and the like in the package's own __init__ are nobody's rank; a folder or a module is.
             if other == "__init__" or other == own:
+                here, there = wing_of(module), wing_of(target)
+                if own == other == "transport" and here != there and WINGS.get(there, 0) >= WINGS.get(here, 0) > 0:
+                    yield f"{where}: {there} does not stand below {here}"
                 continue
             if RANKS.get(other, TOP) >= rank and not (own in LEAVES and other in LEAVES):
                 yield f"{where}: {other} does not stand below {own}"
@@ -92,9 +113,7 @@ def faults(source, module, is_package=False):
 def test_imports_go_down_and_outside_packages_have_one_owner():
     wrong = []
     for path in modules():
-        parts = list(path.relative_to(ROOT).with_suffix("").parts)
-        is_package = parts[-1] == "__init__"
-        wrong += faults(path.read_text(), parts[:-1] if is_package else parts, is_package)
+        wrong += faults(path.read_text(), *named(path))
     assert not wrong, "\n" + "\n".join(wrong)
 
 
@@ -102,10 +121,15 @@ def test_imports_go_down_and_outside_packages_have_one_owner():
     ("scene.checks", "from ..transport import rays"),
     ("scene.checks", "def f():\n    from ..transport.rays import make_tracer"),
     ("scene.checks", "from .. import transport"),
-    ("scene.checks", "import rtgi_addon.transport.rays"),
+    ("scene.checks", "import rtgi_addon.transport.rays.embree"),
     ("scene.checks", "class A:\n    def f(self):\n        import importlib\n        importlib.import_module('rtgi_addon.jobs')"),
     ("techniques.probes.bake", "from ...jobs import bake"),
-    ("techniques.probes.bake", "from ...passes import ssr"),
+    ("techniques.probes.bake", "from ...effects import get"),
+    ("effects.depth_fog", "from ..preview.renderer import Renderer"),
+    ("transport.surfaces.solids", "from ..rays.tracer import Hits"),
+    ("transport.lights.lamps", "from ..rays.tracer import Hits"),
+    ("transport.rays.choose", "from ..context import LightContext"),
+    ("transport.views.shadow_views", "from ..cache.texels import Focus"),
     ("jobs.bake", "from ..blender import extract"),
     ("jobs.bake", "if True:\n    import bpy"),
     ("errors", "from . import numerics"),
@@ -124,11 +148,81 @@ def test_a_climbing_import_is_found(module, source):
     ("techniques.probes.bake", "from ..base import Field\nfrom ...transport import rays\nfrom .field import ProbeField"),
     ("jobs.bake", "from .. import exchange\nfrom ..techniques import get"),
     ("evaluate.chart", "def draw():\n    import matplotlib\n"),
-    ("transport.rays", "import embreex.rtcore_scene\nfrom mathutils import bvhtree"),
+    ("transport.cache.solver", "from ..parallel import chunks\nfrom ..paths import sources\nfrom .texels import Focus"),
+    ("transport.rays.embree", "import embreex.rtcore_scene\nfrom mathutils import bvhtree"),
     ("__main__", "from .blender import cli"),
 ])
 def test_a_falling_import_is_let_through(module, source):
     assert not list(faults(source, [PACKAGE, *module.split(".")]))
+
+
+def test_the_extension_names_its_package_from_where_it_stands():
+    """Blender imports the folder as `bl_ext.….rtgi_addon`: nothing is called `rtgi_addon` alone there."""
+    found = [node for node in ast.walk(ast.parse((ROOT / "__init__.py").read_text())) if isinstance(node, ast.ImportFrom)]
+    assert [(node.level, node.module) for node in found] == [(1, PACKAGE)]
+
+
+def graph():
+    """Every module of the package with those it imports, inside functions too."""
+    known = {tuple(named(path)[0]): path for path in modules()}
+    edges = {}
+    for module, path in known.items():
+        found = set()
+        for _line, target, _top in imports(path.read_text(), *named(path)):
+            found.update(name for name in (tuple(target), tuple(target[:-1])) if name in known and name != module)
+        # `from package import module` needs the module and, before it, the package; only the closer one is meant.
+        edges[module] = {name for name in found if not any(other[:len(name)] == name != other for other in found)}
+    return edges
+
+
+def circles(edges):
+    """Sets of modules each of which imports every other, through whatever is between (Tarjan 1972)."""
+    order, low, stack, found = {}, {}, [], []
+
+    def visit(node):
+        order[node] = low[node] = len(order)
+        stack.append(node)
+        for other in sorted(edges[node]):
+            if other not in order:
+                visit(other)
+            if other in stack:
+                low[node] = min(low[node], low[other])
+        if low[node] == order[node]:
+            circle = stack[stack.index(node):]
+            del stack[stack.index(node):]
+            if len(circle) > 1:
+                found.append(sorted(".".join(module) for module in circle))
+
+    for node in edges:
+        if node not in order:
+            visit(node)
+    return found
+
+
+def test_no_circle_of_modules_exists():
+    edges = graph()
+    assert sum(map(len, edges.values())) > 500  # the walk sees the package at all
+    assert circles(edges) == []
+
+
+def test_a_circle_is_found():
+    edges = {("a",): {("b",)}, ("b",): {("c",), ("d",)}, ("c",): {("a",)}, ("d",): set()}
+    assert circles(edges) == [["a", "b", "c"]]
+
+
+# Packages that are one thing of a kind, and no room for more.
+ONE_OF_A_KIND = re.compile(r"^(TECHNIQUE|EFFECT|ENGINE) = ", re.MULTILINE)
+
+
+def test_every_folder_says_what_lives_in_it_and_what_may_come_in():
+    bare = []
+    for path in (ROOT / PACKAGE).rglob("__init__.py"):
+        text = path.read_text()
+        opening = (ast.get_docstring(ast.parse(text)) or "").split("\n\n")[:2]
+        says = len(" ".join(opening).split()) >= 20 and re.search(r"\bcomes? in\b", " ".join(opening))
+        if not says and not (ONE_OF_A_KIND.search(text) and opening != [""]):
+            bare.append(str(path.relative_to(ROOT)))
+    assert not bare, f"the docstring does not open with what lives here and what may come in: {bare}"
 
 
 def test_modules_do_one_thing():

@@ -4,13 +4,13 @@
     python tools/build_extension.py                          every platform, into dist/
     python tools/build_extension.py --platform linux-x64     only that one; may be repeated
 
-Wheels come from PyPI through pip, which refuses any file whose SHA-256 is not in wheels.txt; they stay in dist/wheels for the next
-run, which then needs no network. Blender's own tool (in the bpy module of this Python) builds and validates the zips. The same
+Wheels come from PyPI through pip, which refuses any file whose SHA-256 is not in wheels.txt, and the kernels' are built by
+build_kernels.py, whose checksums are in kernels.sha256; they stay in dist/wheels for the next run, which then needs no network.
+Blender's own tool (in the bpy module of this Python) builds and validates the zips. The same
 source gives the same bytes.
 """
 
 import argparse
-import hashlib
 import importlib.util
 import re
 import shutil
@@ -19,6 +19,11 @@ import sys
 import tempfile
 import zipfile
 from pathlib import Path
+
+# Also where this file is loaded by its path.
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+from build_kernels import KernelError, pinned_wheel, sha256
 
 ROOT = Path(__file__).resolve().parents[1]
 WHEELS = ROOT / "tools/wheels.txt"
@@ -64,11 +69,6 @@ def blender_tool() -> Path:
 def pinned_hashes() -> set[str]:
     """The SHA-256 of every wheel in wheels.txt."""
     return set(re.findall(r"--hash=sha256:([0-9a-f]{64})", WHEELS.read_text()))
-
-
-def sha256(path: Path) -> str:
-    """The checksum of a file, in hexadecimal."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def fetch_wheels(platform: str, folder: Path) -> list[Path]:
@@ -151,7 +151,7 @@ def wheels_in(path: Path) -> int:
 
 def build(platforms: list[str], output: Path, kept: Path) -> list[Path]:
     """The zips of ``platforms`` in ``output``, built and validated; wheels are kept in ``kept``. Raises BuildError."""
-    wheels = [wheel for platform in platforms for wheel in fetch_wheels(platform, kept)]
+    wheels = [wheel for platform in platforms for wheel in [*fetch_wheels(platform, kept), pinned_wheel(platform, kept)]]
     output.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as temporary:
         source, made, packed = (Path(temporary) / name for name in ("source", "made", "packed"))
@@ -163,7 +163,8 @@ def build(platforms: list[str], output: Path, kept: Path) -> list[Path]:
         zips = []
         for platform in platforms:
             path, = made.glob(f"*-{platform.replace('-', '_')}.zip")
-            if wheels_in(path) != (len(PYTHONS) if PLATFORMS[platform] else 0):
+            # Those of Embree, and the kernels'.
+            if wheels_in(path) != (len(PYTHONS) if PLATFORMS[platform] else 0) + 1:
                 raise BuildError(f"{path.name} carries {wheels_in(path)} wheels: Blender's tool does not know a tag of theirs")
             zips.append(packed / path.name)
             repack(path, zips[-1])
@@ -180,7 +181,7 @@ def main() -> int:
     arguments = parser.parse_args()
     try:
         zips = build(arguments.platform or list(PLATFORMS), arguments.output.resolve(), arguments.wheels.resolve())
-    except (BuildError, OSError) as error:
+    except (BuildError, KernelError, OSError) as error:
         print(f"build_extension: {error}", file=sys.stderr)
         return 1
     for path in zips:

@@ -21,6 +21,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from build_kernels import KernelError, host, wheel
+
 REPOSITORY = Path(__file__).resolve().parents[1]
 SUITE = "sid"
 PACKAGES = (
@@ -74,6 +76,7 @@ def create(tree: Path, extra_packages: list[str], extra_wheels: list[str]) -> No
         check_run(command_in(tree, ["apt-get", "install", "-y", "--no-install-recommends", *missing], environment=environment))
         check_run(command_in(tree, ["apt-get", "clean"], environment=environment))
     install_wheels(tree, [*WHEELS, *extra_wheels])
+    install_kernels(tree)
 
 
 def installed(tree: Path, package: str) -> bool:
@@ -83,13 +86,30 @@ def installed(tree: Path, package: str) -> bool:
     return status.stdout.strip() == "installed"
 
 
-def install_wheels(tree: Path, wheels: list[str]) -> None:
-    """Put ``wheels`` for the tree's Python where its Blender finds them, with this machine's pip and its configuration."""
+def python_packages(tree: Path) -> tuple[str, Path]:
+    """The version of the tree's Python, and where its Blender finds packages that are not Debian's."""
     version = subprocess.run(["chroot", str(tree), "python3", "-c", "import sys; print('%d.%d' % sys.version_info[:2])"],
                              capture_output=True, text=True, check=True).stdout.strip()
-    target = tree / f"usr/local/lib/python{version}/dist-packages"
+    return version, tree / f"usr/local/lib/python{version}/dist-packages"
+
+
+def install_kernels(tree: Path) -> None:
+    """Put the compiled kernels of these sources into ``tree``, as the extension carries them; without them numpy works."""
+    try:
+        path = wheel(host(), REPOSITORY / "dist/wheels")
+    except KernelError as error:
+        print(f"debian_tree: {error}", file=sys.stderr)
+        return
+    _, target = python_packages(tree)
+    check_run([sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index", "--upgrade", "--target", str(target),
+               str(path)])
+
+
+def install_wheels(tree: Path, wheels: list[str]) -> None:
+    """Put ``wheels`` for the tree's Python where its Blender finds them, with this machine's pip and its configuration."""
+    version, target = python_packages(tree)
     present = {re.split(r"-\d", path.name)[0].lower() for path in target.glob("*.dist-info")}
-    missing = [wheel for wheel in wheels if wheel.lower() not in present]
+    missing = [name for name in wheels if name.lower() not in present]
     if missing:
         platforms = [option for platform in WHEEL_PLATFORMS for option in ("--platform", platform)]
         check_run([sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--only-binary=:all:", "--target", str(target),

@@ -1,4 +1,4 @@
-"""Writes the table of settings into the page of every technique in docs/techniques, from its Settings: the panel's own words.
+"""Writes the table of settings into the page of every technique and effect in docs, from its Settings: the panel's own words.
 
     python tools/settings_tables.py
 
@@ -10,33 +10,41 @@ from dataclasses import fields
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = ROOT / "docs/techniques"
+PAGES = ROOT / "docs"
 BEGIN, END = "<!-- settings: written by tools/settings_tables.py -->\n", "<!-- end of settings -->"
 
 
-def table(technique) -> str:
-    """The settings of a technique as a Markdown table."""
+def table(owner) -> str:
+    """The settings of a technique or an effect as a Markdown table."""
+    before = f"{owner.name}." if _is_effect(owner) else ""
     rows = ["| `--set` | in the panel | default | range | what it does |", "|---|---|---:|---|---|"]
-    for item in fields(technique.Settings):
+    for item in fields(owner.Settings):
         meta = item.metadata
-        rows.append(f"| `{item.name}` | {meta['label']} | {_value(item.default)} | {_range(meta)} | {meta['description']} |")
+        cells = f"`{before}{item.name}`", meta["label"], _value(item.default), _range(meta), meta["description"]
+        rows.append(f"| {' | '.join(cells)} |")
     return "\n".join(rows) + "\n"
 
 
-def page(technique) -> Path:
-    """Where a technique's page is."""
-    return PAGES / f"{technique.name}.md"
+def page(owner) -> Path:
+    """Where the page of a technique or an effect is."""
+    return PAGES / ("effects" if _is_effect(owner) else "techniques") / f"{owner.name}.md"
 
 
-def with_table(text: str, technique) -> str:
+def _is_effect(owner) -> bool:
+    return hasattr(owner, "stage")
+
+
+def with_table(text: str, owner) -> str:
     """A page's ``text`` with the table of today's settings between its marks. Raises ValueError without them."""
     head, rest = text.split(BEGIN)
-    return head + BEGIN + table(technique) + END + rest.split(END)[1]
+    return head + BEGIN + table(owner) + END + rest.split(END)[1]
 
 
 def _value(value) -> str:
     if value is None:
         return "unset"
+    if isinstance(value, tuple):
+        return ",".join(map(str, value))
     return str(value).lower() if isinstance(value, bool) else f"{value:,}" if isinstance(value, int) else str(value)
 
 
@@ -55,10 +63,10 @@ def _bound(number) -> str:
 def main() -> None:
     """Rewrite every page."""
     sys.path.insert(0, str(ROOT))
-    from rtgi_addon.techniques import registry
-    for technique in registry().values():
-        path = page(technique)
-        path.write_text(with_table(path.read_text(encoding="utf-8"), technique), encoding="utf-8", newline="\n")
+    from rtgi_addon import effects, techniques
+    for owner in (*techniques.registry().values(), *effects.registry().values()):
+        path = page(owner)
+        path.write_text(with_table(path.read_text(encoding="utf-8"), owner), encoding="utf-8", newline="\n")
 
 
 if __name__ == "__main__":

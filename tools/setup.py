@@ -22,6 +22,7 @@ ROOT = Path(__file__).resolve().parent.parent
 REQUIREMENTS = ROOT / "tools" / "requirements.txt"
 VENV = Path(os.path.abspath(os.environ.get("RTGI_VENV") or ROOT / ".venv"))
 STAMP = VENV / "rtgi-setup.json"
+KERNELS = VENV / "rtgi-kernels.sha256"
 BIN = VENV / ("Scripts" if os.name == "nt" else "bin")
 PYTHON = BIN / ("python.exe" if os.name == "nt" else "python")
 
@@ -112,6 +113,23 @@ def finish(wanted):
     say(f"ready: {last_line(imported.stdout)}")
 
 
+def provide_kernels():
+    """Build and install the compiled kernels unless they are there, of these sources. Without them numpy does their work: that they
+    cannot be built is said, and stops nothing."""
+    build = ROOT / "tools" / "build_kernels.py"
+    digest = hashlib.sha256()
+    for path in [*sorted((ROOT / "rtgi_addon" / "kernels" / "src").glob("*.[ch]")), build, ROOT / "tools" / "kernels.txt"]:
+        digest.update(path.read_bytes())
+    if KERNELS.exists() and KERNELS.read_text() == digest.hexdigest():
+        return
+    say("building the compiled kernels")
+    ran = subprocess.run([str(PYTHON), str(build), "--install"], capture_output=True, text=True)
+    if ran.returncode != 0:
+        say(f"{last_line(ran.stderr)}; bakes go through numpy until then, which takes some 2.2 times as long")
+        return
+    KERNELS.write_text(digest.hexdigest())
+
+
 def main():
     """Set up if that is needed. Returns the exit code."""
     held = None
@@ -123,6 +141,7 @@ def main():
             install(wanted)
         if state(wanted) == "installed":
             finish(wanted)
+        provide_kernels()
     except SetupError as error:
         print(f"setup: {error}", file=sys.stderr)
         return 1

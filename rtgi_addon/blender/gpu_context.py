@@ -7,6 +7,9 @@ import bpy
 from ..errors import BakeError
 from ..preview import context
 
+# Side of the picture that starts the GPU [pixels].
+_PICTURE_SIDE = 8
+
 
 def open_context() -> None:
     """Make Blender's gpu module usable on this, the main thread; nothing to do where it is. Raises BakeError where it cannot be."""
@@ -34,7 +37,7 @@ class _Starter(bpy.types.RenderEngine):
 
 
 def _render_once() -> None:
-    """Before Blender 5.2: render 8 × 8 pixels of a scene of our own, and leave nothing of it behind. (Blender 4.5 hangs at exit if
+    """Before Blender 5.2: render a few pixels of a scene of our own, and leave nothing of it behind. (Blender 4.5 hangs at exit if
     an engine that has rendered is still registered.)"""
     bpy.utils.register_class(_Starter)
     scene = bpy.data.scenes.new("RTGI GPU starter")
@@ -44,7 +47,7 @@ def _render_once() -> None:
         scene.collection.objects.link(eye)
         scene.camera = eye
         scene.render.engine = _Starter.bl_idname
-        scene.render.resolution_x = scene.render.resolution_y = 8
+        scene.render.resolution_x = scene.render.resolution_y = _PICTURE_SIDE
         bpy.ops.render.render(scene=scene.name)
     finally:
         bpy.data.scenes.remove(scene)

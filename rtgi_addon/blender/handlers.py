@@ -5,9 +5,11 @@ import time
 import bpy
 from bpy.app.handlers import persistent
 
-from . import properties
+from .bundles import find_last_bakes
 from .fingerprint import fingerprint
 from .session import redraw, session
+from .ui import properties
+from .ui.modal_job import forget_jobs
 
 # Scenes whose digest takes longer than this are not compared again: any change to them counts as one [s].
 _PATIENCE = 0.25
@@ -17,14 +19,15 @@ _slow: set[str] = set()
 
 @persistent
 def cancel_before_load(*_) -> None:
-    """Another file is coming: a bake of this one has nobody left to report to."""
-    session.forget_scenes()
+    """Another file is coming: what is under way for this one has nobody left to report to."""
+    forget_jobs()
     _slow.clear()
 
 
 @persistent
 def compare_after_load(*_) -> None:
-    """A file was opened: see whether it still is what was baked."""
+    """A file was opened: find its last bake, and see whether it still is what was baked."""
+    find_last_bakes()
     _compare_soon()
 
 
@@ -58,7 +61,8 @@ def _compare_soon() -> None:
         return
     if bpy.app.timers.is_registered(_compare):
         bpy.app.timers.unregister(_compare)
-    bpy.app.timers.register(_compare, first_interval=_DELAY)
+    # Others are dropped when a file was opened, after its handlers have run.
+    bpy.app.timers.register(_compare, first_interval=_DELAY, persistent=True)
 
 
 def _compare() -> None:

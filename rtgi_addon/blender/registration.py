@@ -2,27 +2,39 @@
 
 from types import ModuleType
 
-from . import (
-    chart_ui,
-    cli,
-    engine,
-    export_ui,
-    handlers,
-    leaks_ui,
-    operators,
+from . import cli, engine, handlers, output, translations
+from .ui import (
+    atlas_panels,
+    bake_operators,
+    chart,
+    effect_panels,
+    effect_settings,
+    export,
+    leaks,
+    light_panels,
+    light_settings,
+    media,
     panels,
-    plan_ui,
-    preset_ui,
+    placement,
+    plan,
+    presets,
     preview_panels,
     preview_settings,
     properties,
-    stability_ui,
-    translations,
+    role_properties,
+    roles,
+    select_named,
+    series,
+    sphere_panels,
+    stability,
+    styles,
+    verify,
 )
 
 _MODULES = (
-    translations, properties, preview_settings, preset_ui, operators, panels, plan_ui, chart_ui, stability_ui, leaks_ui, export_ui,
-    preview_panels, engine, handlers, cli,
+    translations, properties, role_properties, preview_settings, effect_settings, light_settings, presets, select_named,
+    bake_operators, panels, placement, series, sphere_panels, roles, atlas_panels, verify, plan, chart, stability, leaks, media,
+    export, preview_panels, light_panels, styles, effect_panels, engine, handlers, output, cli,
 )
 _registered: list[ModuleType] = []
 

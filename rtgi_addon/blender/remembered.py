@@ -36,6 +36,11 @@ def answer(key: Callable[[], str], ask: Callable[[], object]):
     return _answers[name]
 
 
+def remembers(name: str) -> bool:
+    """Whether ``answer`` has something kept under the key ``name``."""
+    return name in _answers
+
+
 def forget() -> None:
     """Drop everything: another file is open."""
     _answers.clear()

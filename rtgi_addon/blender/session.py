@@ -10,15 +10,19 @@ import bpy
 from ..progress import Progress
 from ..scene import Scene
 from ..techniques import Field
-from .worker import BakeWorker
+from ..transport.media.summary import MediumFound, found_media
+from .worker import Job
 
 
 @dataclass(frozen=True)
 class Finding:
-    """A line for the panel. ``severity`` is 'error', 'warning' or 'note'."""
+    """A line for the panel. ``severity`` is 'error', 'warning' or 'note'; ``objects`` and ``materials`` are the names of what it is
+    about, which a click on it selects."""
 
     severity: str
     text: str
+    objects: tuple[str, ...] = ()
+    materials: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,36 +38,31 @@ class Baked:
         return self.field.relight(replace(self.scene, lights=scene.lights, world=scene.world), progress)
 
 
-@dataclass
-class Session:
-    """``worker`` is the latest bake, which may have ended; ``baking`` names its scene while it runs.
+@dataclass(eq=False)
+class Session(Job):
+    """The bake as a job, and what is known of the scenes.
 
-    By scene name: ``findings`` of its last reading (absent before the first); ``errors``, why the last attempt failed;
-    ``digests`` of the scene as it was last read; ``records``, what was written to ``Scene.rtgi.last_bake`` in this session;
-    ``stale``, whether it differs from its last bake. ``baked`` holds, by scene name and technique, the last bake of this session:
-    the preview shows and relights it.
+    By scene name: ``findings`` of its last reading (absent before the first); ``digests`` of the scene as it was last read;
+    ``records``, what was written to ``Scene.rtgi.last_bake`` in this session; ``stale``, whether it differs from its last bake.
+    ``media`` are those that its last reading found.
+    ``baked`` holds, by scene name and technique, the last bake of this session: the preview shows and relights it.
     """
 
-    worker: BakeWorker | None = None
-    baking: str = ""
     findings: dict[str, list[Finding]] = field(default_factory=dict)
-    errors: dict[str, str] = field(default_factory=dict)
     digests: dict[str, str] = field(default_factory=dict)
     records: dict[str, dict] = field(default_factory=dict)
     stale: dict[str, bool] = field(default_factory=dict)
     baked: dict[tuple[str, str], Baked] = field(default_factory=dict)
+    media: dict[str, tuple[MediumFound, ...]] = field(default_factory=dict)
 
-    @property
-    def running(self) -> bool:
-        """True while a bake is under way."""
-        return self.worker is not None and self.worker.running
+    def note_media(self, name: str, scene: Scene) -> None:
+        """Keep what a reading of the scene of that name found of media."""
+        self.media[name] = found_media(scene.media)
 
-    def forget_scenes(self) -> None:
-        """Another file is about to be opened: stop the bake and drop all that was known of the old one's scenes."""
-        if self.worker is not None:
-            self.worker.cancel()
-        self.baking = ""
-        for known in (self.findings, self.errors, self.digests, self.records, self.stale, self.baked):
+    def forget(self) -> None:
+        """Drop what was baked and found too."""
+        super().forget()
+        for known in (self.findings, self.digests, self.records, self.stale, self.baked, self.media):
             known.clear()
 
 

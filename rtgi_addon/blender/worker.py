@@ -1,20 +1,24 @@
 """A bake on a worker thread, watched from Blender's main thread, and what of it must run there. Nothing here touches Blender."""
 
 import queue
+import sys
 import threading
 import time
 import traceback
 from collections.abc import Callable
 from concurrent.futures import Future, wait
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from ..errors import BakeError, Cancelled
+from ..errors import BakeError, Cancelled, out_of_memory
 from ..progress import Progress
+from ..words import printable
 
 # How long a bake waits for the main thread before it looks whether it was cancelled [s].
 _PATIENCE = 0.05
 # How long the main thread serves a bake at a time, and how long it waits for the next call [s]: the window stays alive.
 _SERVICE, _FOLLOW_UP = 0.08, 0.02
+# What a cancelled run is given to end [s].
+_GRACE = 5.0
 
 
 @dataclass(frozen=True)
@@ -28,10 +32,12 @@ class Report:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a bake ended: ``summary`` of the finished bundle, or ``error`` as one line, or neither when it was cancelled."""
+    """How a bake ended: ``summary`` of the finished bundle, or ``error`` as one line, or neither when it was cancelled; ``kept``
+    then says what of it is left, if anything."""
 
     summary: dict | None = None
     error: str = ""
+    kept: str = ""
 
     @property
     def cancelled(self) -> bool:
@@ -108,14 +114,16 @@ class BakeWorker:
         """Bake here and now; exceptions become an ``Outcome``."""
         try:
             self.outcome = Outcome(summary=self._bake(self.progress))
-        except Cancelled:
-            self.outcome = Outcome()
+        except Cancelled as cancelled:
+            self.outcome = Outcome(kept=str(cancelled))
         except BakeError as error:
             self.outcome = Outcome(error=str(error))
-        except MemoryError:
-            self.outcome = Outcome(error="the bake ran out of memory: use fewer probes or a lower SH order")
         except Exception as error:
-            traceback.print_exc()
+            memory = out_of_memory(error)
+            if memory is not None:
+                self.outcome = Outcome(error=str(memory))
+                return self.outcome
+            sys.stderr.write(printable(traceback.format_exc()))
             first_line = (str(error).splitlines() or [""])[0]
             self.outcome = Outcome(error=f"the bake failed with {type(error).__name__}: {first_line} (details in the console)")
         return self.outcome
@@ -157,11 +165,60 @@ class BakeWorker:
             self._on_report(report)
 
 
+@dataclass(eq=False)
+class Job:
+    """What one operator has under way: its latest ``worker``, which may have ended, None before the first; ``scene``, the name of
+    the one it works for while it does; ``errors``, why the last attempt failed, by scene name."""
+
+    worker: BakeWorker | None = None
+    scene: str = ""
+    errors: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def running(self) -> bool:
+        """True while the worker works."""
+        return self.worker is not None and self.worker.running
+
+    @property
+    def occupied(self) -> bool:
+        """True while the worker works and nobody has asked it to stop."""
+        return self.running and not self.worker.progress.cancelled
+
+    def take(self, worker: BakeWorker, scene: str) -> BakeWorker:
+        """``worker`` is what is under way now, for ``scene``; returns it."""
+        self.worker, self.scene = worker, scene
+        return worker
+
+    def leave(self, worker: BakeWorker) -> None:
+        """``worker`` has ended, or nobody waits for it; without effect where another one has taken its place."""
+        if worker is self.worker:
+            self.scene = ""
+
+    def require_ended(self, noun: str) -> None:
+        """Raise BakeError while a cancelled run, called ``noun``, has not come to its end."""
+        if self.worker is not None and not self.worker.join(_GRACE):
+            raise BakeError(f"the {noun} that was cancelled is still ending", "try again in a moment")
+
+    def stop(self) -> None:
+        """Cancel what is running and give it a moment to end."""
+        if self.worker is not None:
+            self.worker.cancel()
+            self.worker.join(_GRACE)
+            self.worker = None
+
+    def forget(self) -> None:
+        """Another file is about to be opened: cancel what is running, and drop what belongs to the old one's scenes."""
+        if self.worker is not None:
+            self.worker.cancel()
+        self.scene = ""
+        self.errors.clear()
+
+
 def duration(seconds: float) -> str:
     """``seconds`` as a person reads it: 8 s, 2 min 05 s, 1 h 10 min."""
     whole = max(round(seconds), 0)
-    if whole < 60:
-        return f"{whole} s"
-    if whole < 3600:
-        return f"{whole // 60} min {whole % 60:02d} s"
-    return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
+    minutes, seconds = divmod(whole, 60)
+    hours, minutes_of_hour = divmod(minutes, 60)
+    if hours:
+        return f"{hours} h {minutes_of_hour:02d} min"
+    return f"{minutes} min {seconds:02d} s" if minutes else f"{whole} s"

@@ -1,10 +1,12 @@
 """What a chart of speed against accuracy says, as data: one point for every setting of every technique, with figures over seeds."""
 
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 
 from ..techniques import Technique
 from .measure import Run, Yard
 from .pareto import pareto_front
+from .pictures import PictureChart
+from .setting_labels import setting_label
 from .statistics import CONFIDENCE, Interval, Spread, interval, log_interval, spread
 
 SCHEMA = "rtgi-chart/1"
@@ -63,7 +65,8 @@ class Point:
 class Chart:
     """All that was measured on one scene. ``points`` are in the order of techniques and their sweeps; ``left_out`` says, a line
     each, what was not measured and why; ``complete`` is false for a chart that was cancelled. ``reference`` holds kind and noise,
-    ``receivers`` their numbers, ``floor`` the least error that can be told from none, ``machine`` where it ran."""
+    ``receivers`` their numbers, ``floor`` the least error that can be told from none, ``machine`` where it ran; ``pictures`` are
+    those of effects, None where none was measured. Without techniques ``reference`` and ``receivers`` are empty."""
 
     scene: str
     reference: dict
@@ -75,12 +78,13 @@ class Chart:
     points: tuple[Point, ...]
     left_out: tuple[str, ...] = ()
     complete: bool = True
+    pictures: PictureChart | None = None
 
     def front(self, cost: str = "seconds", place: str = "surface") -> list[int]:
         """Indices of the points on the Pareto front of ``cost`` and error in ``place``, by rising cost."""
         rows = [index for index, point in enumerate(self.points) if None not in (point.cost(cost), point.error(place))]
-        found = pareto_front([self.points[row].cost(cost) for row in rows], [self.points[row].error(place) for row in rows])
-        return [rows[index] for index in found]
+        front = pareto_front([self.points[row].cost(cost) for row in rows], [self.points[row].error(place) for row in rows])
+        return [rows[index] for index in front]
 
     def techniques(self) -> list[str]:
         """Names of the techniques that were measured, in order."""
@@ -109,28 +113,13 @@ def point_of(yard: Yard, technique: Technique, runs: list[Run]) -> Point:
                     "errors": {place: asdict(errors) for place, errors in run.errors.items()}} for run in runs))
 
 
-def setting_label(settings, default) -> str:
-    """What sets ``settings`` apart from ``default``, as short as the settings' own labels allow."""
-    parts = []
-    for item in fields(settings):
-        value = getattr(settings, item.name)
-        if value != getattr(default, item.name):
-            name = " ".join(word if word.isupper() else word.lower() for word in item.metadata["label"].split())
-            parts.append(name if value is True else f"no {name}" if value is False else f"{value:,g} {name}"
-                         if isinstance(value, int) and name.endswith("s") else f"{name} {_number(value)}")
-    return ", ".join(parts) or "defaults"
-
-
-def _number(value) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
-
-
 def _accuracy(yard: Yard, technique: Technique, runs: list[Run], place: str) -> Accuracy:
     errors = [run.errors[place] for run in runs]
 
     def mean(name):
-        values = [getattr(one, name) for one in errors]
+        values = [getattr(of_run, name) for of_run in errors]
         return None if None in values else sum(values) / len(values)
 
-    return Accuracy(spread(yard, technique, runs, place), interval([one.bias for one in errors]), mean("relmse"), mean("energy"),
-                    mean("leak"), mean("true_leak"), mean("minimum"))
+    bias = interval([of_run.bias for of_run in errors])
+    return Accuracy(spread(yard, technique, runs, place), bias, mean("relmse"), mean("energy"), mean("leak"),
+                    mean("true_leak"), mean("minimum"))

@@ -4,14 +4,17 @@ Only this module needs matplotlib, and only when it draws. Colours are Okabe and
 each technique has a marker of its own as well.
 """
 
+import io
 from pathlib import Path
 
 import numpy as np
 
+from ..storage.files import disk_error
+from ..storage.writing import write_file
 from .chart_data import MEBIBYTE, Chart, Point
 from .error_map import COLOURS, FULL_SCALE
 
-HOW_TO_GET_PICTURES = "no chart.png and chart.svg without matplotlib: `pip install matplotlib` for this Python, then chart again"
+HOW_TO_GET_PICTURES = "chart.png is a plain one, without matplotlib: `pip install matplotlib` for this Python for more of it"
 OKABE_ITO = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 MARKERS = "oD^svP*"
 INK, FAINT_INK = "#222222", "#777777"
@@ -24,6 +27,14 @@ PLACES = ((6, 5, "left", "bottom"), (6, -5, "left", "top"), (-6, 5, "right", "bo
 LEAST = 1e-4
 # Axes go this factor beyond the outermost points, and span this factor at least.
 MARGIN, LEAST_SPAN = 1.6, 5.0
+# Bars reach down to this share of their point at most: towards 0 a logarithmic axis has no end.
+SHORTEST = 0.05
+# An axis of fewer decades has ticks at 1, 2 and 5, one of more than the second number at 1 alone, others at 1 and 3.
+FEW_DECADES, MANY_DECADES = 2.2, 3.5
+# Side of the square about a point that labels keep off [points].
+POINT_SIDE = 10
+# A label this far from its point [points] or less needs no line to it.
+NEAR_LABEL = 10
 
 
 def can_draw() -> bool:
@@ -67,8 +78,8 @@ def draw_chart(chart: Chart, folder: Path) -> tuple[Path, Path]:
         figure.set_layout_engine("none")
         _place_labels(main, chart)
         png, svg = folder / "chart.png", folder / "chart.svg"
-        figure.savefig(png, dpi=160)
-        figure.savefig(svg, metadata={"Date": None})
+        save_figure(figure, png, dpi=160)
+        save_figure(figure, svg, metadata={"Date": None})
     return png, svg
 
 
@@ -96,8 +107,18 @@ def draw_error_sheet(path: Path, pictures: list[tuple[str, np.ndarray]]) -> Path
         bar = figure.colorbar(scale, ax=axes.tolist(), orientation="horizontal", fraction=0.05, aspect=60, pad=0.02, extend="both")
         bar.set_label("error of irradiance [%]: blue is too dark, red too bright")
         bar.outline.set_visible(False)
-        figure.savefig(path, dpi=130)
+        save_figure(figure, path, dpi=130)
     return path
+
+
+def save_figure(figure, path: Path, **options) -> None:
+    """By way of memory, so that the file is whole or not there. Raises BakeError."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format=path.suffix[1:], **options)
+    try:
+        write_file(path, buffer.getvalue())
+    except OSError as error:
+        raise disk_error(path, error) from error
 
 
 def _draw_panel(axis, chart: Chart, cost: str, place: str, small: bool = False) -> None:
@@ -116,14 +137,14 @@ def _draw_panel(axis, chart: Chart, cost: str, place: str, small: bool = False) 
         colour, marker = _look(chart, name)
         x = np.array([point.cost(cost) * factor for point in points])
         y = np.array([_shown_error(point, place) for point in points])
-        own = np.array([point.lattice == 1.0 for point in points])
-        axis.plot(x[own], y[own], "-", color=colour, linewidth=0.8, alpha=0.45, zorder=2)
+        joined = np.array([point.lattice == 1.0 for point in points])
+        axis.plot(x[joined], y[joined], "-", color=colour, linewidth=0.8, alpha=0.45, zorder=2)
         for values, intervals, direction in ((x, [getattr(point, cost) for point in points], "x"),
                                              (y, [point.accuracy[place].spread.error for point in points], "y")):
             scale = factor if direction == "x" else 100.0
-            bars = np.array([[0.0, 0.0] if one.low is None else [max(v - max(one.low * scale, 0.05 * v), 0.0),
-                                                                 max(one.high * scale - v, 0.0)]
-                             for v, one in zip(values, intervals, strict=True)]).T
+            bars = np.array([[0.0, 0.0] if around.low is None else [max(value - max(around.low * scale, SHORTEST * value), 0.0),
+                                                                    max(around.high * scale - value, 0.0)]
+                             for value, around in zip(values, intervals, strict=True)]).T
             axis.errorbar(x, y, **{f"{direction}err": bars}, fmt="none", ecolor=colour, elinewidth=0.8, alpha=0.6, zorder=2)
         size = 4.5 if small else 7
         filled = np.array([point.default for point in points])
@@ -142,8 +163,6 @@ def _draw_panel(axis, chart: Chart, cost: str, place: str, small: bool = False) 
 
 def _finish_axes(axis, chart: Chart, cost: str, place: str, x: np.ndarray, y: np.ndarray) -> None:
     """Scales, ticks and labels about the points ``x``, ``y`` (n,)."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
-
     axis.set_xlabel({"seconds": "bake [s]", "rays": "rays [million]", "peak_bytes": "peak memory of the bake [MiB]"}[cost])
     axis.set_ylabel("relative RMSE [%]")
     for values, set_limits in ((x, axis.set_xlim), (y, axis.set_ylim)):
@@ -155,12 +174,20 @@ def _finish_axes(axis, chart: Chart, cost: str, place: str, x: np.ndarray, y: np
     if place != "probes" and 100 * chart.floor > low:
         axis.axhspan(low, 100 * chart.floor, color="#bbbbbb", alpha=0.35, linewidth=0, zorder=0)
         axis.set_ylim(low, high)
-    for part in (axis.xaxis, axis.yaxis):
-        ends = part.get_view_interval()
+    log_ticks(axis)
+
+
+def log_ticks(axis) -> None:
+    """Ticks of both logarithmic axes as plain numbers, and a grid."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+    for scale in (axis.xaxis, axis.yaxis):
+        ends = scale.get_view_interval()
         decades = np.log10(ends[1] / ends[0])
-        part.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if decades < 2.2 else (1.0,) if decades > 3.5 else (1.0, 3.0)))
-        part.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        part.set_minor_locator(NullLocator())
+        ticks = (1.0, 2.0, 5.0) if decades < FEW_DECADES else (1.0,) if decades > MANY_DECADES else (1.0, 3.0)
+        scale.set_major_locator(LogLocator(subs=ticks))
+        scale.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        scale.set_minor_locator(NullLocator())
     axis.grid(True, which="major", color="#dddddd", linewidth=0.6, zorder=0)
     axis.set_axisbelow(True)
     for side in ("top", "right"):
@@ -168,27 +195,32 @@ def _finish_axes(axis, chart: Chart, cost: str, place: str, x: np.ndarray, y: np
 
 
 def _place_labels(axis, chart: Chart) -> None:
-    """Label every point of the main panel where its label overlaps neither a point nor another label; leave out those that find no
-    place, front and defaults first."""
+    """Label every point of the main panel, front and defaults first."""
+    front = set(chart.front())
+    place_labels(axis, [(point.seconds.mean, _shown_error(point, "surface"), point.label, _look(chart, point.technique)[0],
+                         (index not in front, not point.default)) for index, point in enumerate(chart.points)])
+
+
+def place_labels(axis, entries: list[tuple]) -> None:
+    """Write the labels of ``entries``, (x, y, text, colour, rank), where each overlaps neither a point nor another label; leave out
+    those that find no place, the highest ranks first."""
     from matplotlib.patheffects import withStroke
     from matplotlib.text import Text
     from matplotlib.transforms import Bbox
 
     renderer = axis.figure.canvas.get_renderer()
     frame = axis.get_window_extent(renderer)
-    where = [axis.transData.transform((point.seconds.mean, _shown_error(point, "surface"))) for point in chart.points]
     pixels = axis.figure.dpi / 72.0
-    taken = [Bbox.from_bounds(x - 5 * pixels, y - 5 * pixels, 10 * pixels, 10 * pixels) for x, y in where]
-    front = set(chart.front())
-    order = sorted(range(len(chart.points)), key=lambda index: (index not in front, not chart.points[index].default))
-    for index in order:
-        point = chart.points[index]
+    side = POINT_SIDE * pixels
+    taken = [Bbox.from_bounds(x - side / 2, y - side / 2, side, side) for x, y in
+             (axis.transData.transform(entry[:2]) for entry in entries)]
+    line = {"arrowstyle": "-", "color": FAINT_INK, "linewidth": 0.4}
+    for index in sorted(range(len(entries)), key=lambda index: entries[index][4]):
+        x, y, label, colour, _ = entries[index]
         for dx, dy, horizontal, vertical in PLACES:
-            text = axis.annotate(point.label, (point.seconds.mean, _shown_error(point, "surface")), (dx, dy),
-                                 textcoords="offset points", ha=horizontal, va=vertical, fontsize=FONT - 1,
-                                 color=_look(chart, point.technique)[0], zorder=5,
-                                 path_effects=[withStroke(linewidth=2, foreground="white")],
-                                 arrowprops={"arrowstyle": "-", "color": FAINT_INK, "linewidth": 0.4} if abs(dy) > 10 else None)
+            text = axis.annotate(label, (x, y), (dx, dy), textcoords="offset points", ha=horizontal, va=vertical, fontsize=FONT - 1,
+                                 color=colour, zorder=5, path_effects=[withStroke(linewidth=2, foreground="white")],
+                                 arrowprops=line if abs(dy) > NEAR_LABEL else None)
             # Of the words alone: an annotation counts the line to its point as well.
             text.update_positions(renderer)
             box = Text.get_window_extent(text, renderer).padded(1.5 * pixels)

@@ -2,6 +2,7 @@
 
 from .chart_data import MEBIBYTE, Chart, Point
 from .pareto import best_within, cheapest_within, round_steps
+from .pictures import BLOCK, SAMPLES, WITHOUT
 from .statistics import Interval
 
 # Rows of the equal-time and equal-error tables at most.
@@ -12,6 +13,11 @@ ERROR_STEPS = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
 def markdown(chart: Chart, pictures: tuple[str, ...] = ()) -> str:
     """The whole report; ``pictures`` are file names to show, those that were drawn."""
     reference, receivers = chart.reference, chart.receivers
+    left_out = ["## Left out", *(f"- {line}" for line in chart.left_out)] if chart.left_out else []
+    if not chart.points:
+        cancelled = [] if chart.complete else ["**Cancelled before the end: not every picture is there.**"]
+        parts = [f"# {chart.scene}: speed against accuracy", *cancelled, *_effects(chart), *left_out]
+        return "\n\n".join(parts).replace("\n\n- ", "\n- ") + "\n"
     parts = [
         f"# {chart.scene}: speed against accuracy",
         *([] if chart.complete else ["**Cancelled before the end: not every setting has every seed.**"]),
@@ -30,19 +36,55 @@ def markdown(chart: Chart, pictures: tuple[str, ...] = ()) -> str:
         "## At equal time", "The least surface error that a technique reaches within the time; only measured settings, nothing "
         "interpolated.", _equal_time(chart),
         "## At equal error", "The least time in which a technique reaches the error.", _equal_error(chart),
-        *_known(chart), *_leaks(chart),
-        *(["## Left out", *(f"- {line}" for line in chart.left_out)] if chart.left_out else []),
+        *_known(chart), *_leaks(chart), *_effects(chart),
+        *left_out,
     ]
     return "\n\n".join(parts).replace("\n\n- ", "\n- ") + "\n"
 
 
 def summary(chart: Chart) -> str:
-    """A few lines for a terminal: the Pareto front."""
+    """A few lines for a terminal: the Pareto front; "" without techniques."""
+    if not chart.points:
+        return ""
     lines = []
     for index in chart.front():
         point = chart.points[index]
         lines.append(f"  {_seconds(point.seconds.mean):>8}  {_percent(point.error()):>7}  {point.technique}, {point.label}")
     return "\n".join(["  time      error    the least time for this error", *lines])
+
+
+def picture_summary(chart: Chart) -> str:
+    """A few lines for a terminal: each effect at its defaults and the picture without it; "" if no effect was measured."""
+    if chart.pictures is None:
+        return ""
+    lines = [f"  CPU time  error    of the picture, {SAMPLES} samples, against {chart.pictures.reference['kind']}"]
+    for point in chart.pictures.points:
+        if point.default or point.label == WITHOUT:
+            time, error = _seconds(point.last.cpu_seconds), _percent(point.last.error)
+            lines.append(f"  {time:>8}  {error:>7}  {point.effect}, {point.label}")
+    return "\n".join(lines)
+
+
+def _effects(chart: Chart) -> list[str]:
+    pictures = chart.pictures
+    if pictures is None:
+        return []
+    width, height = pictures.size
+    reference = pictures.reference
+    parts = ["## Effects", "![effects.png](effects.png)",
+             f"Errors of the picture through {pictures.camera}, {width} × {height} pixels: relative RMSE of all pixels "
+             f"against {reference['kind']}, whose own noise of {_percent(reference['noise'])} a pixel is taken out; below about "
+             f"{_percent(reference['floor'])} they cannot be told from none. *Coarse* is that of means over {BLOCK} × {BLOCK} "
+             "pixels. Times are wall clock from the scene to the picture, what an effect prepares included, and no bake: "
+             "effects that "
+             "do not light surfaces themselves have probes at their defaults."]
+    rows = []
+    for point in pictures.points:
+        rows.append([point.effect, f"**{point.label}**" if point.default else point.label,
+                     *(_percent(step.error) for step in point.steps), _percent(point.coarse),
+                     f"{100 * point.last.bias:+.1f} %", _seconds(point.last.seconds), _seconds(point.last.cpu_seconds)])
+    counts = [f"{step.samples} sample{'s' * (step.samples > 1)}" for step in pictures.points[0].steps]
+    return [*parts, _table(["effect", "setting", *counts, "coarse", "bias", "time", "CPU time"], rows, 2)]
 
 
 def _settings_table(chart: Chart) -> str:

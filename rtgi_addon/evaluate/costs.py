@@ -17,7 +17,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..transport.ray_counter import count_rays
+from ..transport.rays.ray_counter import count_rays
 
 # Seconds between two samples of resident memory.
 INTERVAL = 0.02

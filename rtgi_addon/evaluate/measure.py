@@ -14,18 +14,19 @@ Each bake is held to the reference in several places, which separates the causes
 
 from dataclasses import dataclass, field, replace
 from time import perf_counter
+from typing import Protocol
 
 import numpy as np
 
 from ..errors import BakeError
 from ..numerics import sh
-from ..numerics.grid import cell_size, lattice_points
 from ..progress import Progress
 from ..scene import Scene
 from ..techniques import Field, Technique
 from ..techniques.base import KNOWN_LIGHT
-from ..techniques.probes.field import ProbeField
-from ..techniques.probes.placement import place
+from ..techniques.lattice.field import ProbeField
+from ..techniques.lattice.focus import probes_of, spacing_of
+from ..techniques.lattice.placement import place
 from ..transport.context import LightContext
 from .costs import Costs, metered
 from .metrics import energy_ratio, leak_ratio, relative_rmse, relmse
@@ -38,6 +39,10 @@ DARK = 0.01
 LIFT = 0.2
 # Bands that probes are compared in, the most that any engine stores.
 PROBE_ORDER = 2
+# How far a measurement is when the field is baked.
+_BAKED = 0.9
+# Tells the choice of probes apart from all other numbers of a seed: the letters pr.
+_STREAM = 0x7072
 PLACES = ("surface", "own_normals", "shipped", "probes", "known")
 
 
@@ -78,16 +83,26 @@ class Run:
     lattice: float = 1.0
 
 
+class Keep(Protocol):
+    """Where what was measured outlives the run (storage/parts.py)."""
+
+    def save(self, name: str, arrays: dict[str, np.ndarray], document: dict | None = None) -> None:
+        """Store arrays and a JSON-able document under ``name``."""
+
+    def load(self, name: str) -> tuple[dict[str, np.ndarray], dict] | None:
+        """What was stored under ``name``, or None."""
+
+
 class Yard:
     """A scene made ready to measure on. ``scene``'s volumes lose their own settings: what is measured is what is said.
 
     ``receivers`` are made at the scene's usable probes unless given; ``reference`` is the path tracer unless given. References are
-    traced when they are first needed.
+    traced when they are first needed; those that ``keep`` has from an earlier run are taken from there, and others given to it.
     """
 
     def __init__(self, scene: Scene, *, points: int = 128, normals_per_point: int = 4, probes: int = 64, noise: float = 0.01,
                  seed: int = 0, threads: int | None = None, receivers: Receivers | None = None,
-                 reference: Reference | None = None):
+                 reference: Reference | None = None, keep: Keep | None = None):
         """Raises BakeError if no probe is usable or nothing can be seen from any."""
         self.scene = replace(scene, volumes=tuple(replace(volume, settings={}) for volume in scene.volumes))
         self.threads = threads
@@ -97,22 +112,21 @@ class Yard:
         self.usable = open_probes(self.context, self.scene.volumes)
         if not len(self.usable):
             raise BakeError("no probe lies in the open", "move the Light Probe Volume out of geometry")
-        lattice = np.concatenate([lattice_points(volume.world_from_local, volume.resolution).reshape(-1, 3)
-                                  for volume in self.scene.volumes])
+        lattice = probes_of(self.scene.volumes)
         self.receivers = receivers if receivers is not None else surface_receivers(
-            self.context, lattice[self.usable], points, normals_per_point, seed, LIFT * min(
-                cell_size(volume.world_from_local, volume.resolution).min() for volume in self.scene.volumes))
+            self.context, lattice[self.usable], points, normals_per_point, seed, LIFT * spacing_of(self.scene.volumes))
         if not len(self.receivers.points):
             raise BakeError("no surface can be seen from any probe", "move the Light Probe Volume to the geometry")
         # A bake moves probes off a wall that they lie on: what they hold is no answer for their lattice point.
         unmoved = self.usable[~place(self.context, self.scene.volumes, True, Progress()).offset[self.usable].any(axis=1)]
         comparable = unmoved if len(unmoved) else self.usable
-        chosen = np.random.default_rng([seed, 0x7072]).permutation(len(comparable))[:probes]
+        chosen = np.random.default_rng([seed, _STREAM]).permutation(len(comparable))[:probes]
         self.probe_rows = np.sort(comparable[chosen])
         self.probe_points = lattice[self.probe_rows].astype(np.float32)
         self.path_reference = PathReference(self.context, noise)
         self.reference = reference or self.path_reference
         self._truths: dict[object, Truth] = {}
+        self._keep = keep
 
     def prepare(self, known: list[frozenset[str]], progress: Progress) -> None:
         """Trace the references now: of all light, and of each set of light sources in ``known``."""
@@ -150,32 +164,36 @@ class Yard:
         scene = self.scene if lattice == 1.0 else replace(self.scene, volumes=tuple(
             replace(volume, resolution=scaled_resolution(volume.resolution, lattice)) for volume in self.scene.volumes))
         with metered() as costs:
-            baked = technique.bake(scene, settings, np.random.default_rng(seed), progress.span(0.0, 0.9),
+            baked = technique.bake(scene, settings, np.random.default_rng(seed), progress.span(0.0, _BAKED),
                                    threads=self.threads, **options)
             grids = baked.grids()
-        progress.step(0.9, "looking up receivers")
+        progress.step(_BAKED, "looking up receivers")
         started = perf_counter()
         surface = baked.irradiance(self.receivers.points, self.receivers.normals)
         lookup = (perf_counter() - started) / len(surface)
-        probes = baked if isinstance(baked, ProbeField) else ProbeField(grids, includes_direct=baked.includes_direct)
+        probes = ProbeField.of(baked)
         estimates = {"surface": surface, "own_normals": surface[self.receivers.own],
                      "shipped": probes.irradiance(self.receivers.points, self.receivers.normals)}
         if lattice == 1.0:
             estimates["probes"] = np.concatenate([grid.sh.reshape(-1, *grid.sh.shape[3:]) for grid in grids])[self.probe_rows]
         if technique.knows != KNOWN_LIGHT:
             estimates["known"] = surface
-        errors = {place: self._errors(place, estimate, technique) for place, estimate in estimates.items()}
-        return Run(technique.name, settings, seed, costs, lookup, sum(array.nbytes for array in baked.arrays().values()),
-                   errors, estimates, baked, lattice)
+        run = Run(technique.name, settings, seed, costs, lookup, sum(array.nbytes for array in baked.arrays().values()), {},
+                  estimates, baked, lattice)
+        return self.compared(run, technique)
+
+    def compared(self, run: Run, technique: Technique) -> Run:
+        """``run`` of ``technique`` with its errors, from its estimates."""
+        return replace(run, errors={place: self._errors(place, estimate, technique) for place, estimate in run.estimates.items()})
 
     def truth_for(self, place: str, estimate: np.ndarray, technique: Technique) -> Truth:
         """The reference that ``estimate`` in ``place`` (of PLACES) is held to, of its shape."""
         if place == "probes":
             count = min(estimate.shape[1], sh.coefficient_count(PROBE_ORDER))
-            return Truth(*(part[:, :count] for part in self.probe_truth))
+            return Truth(*(values[:, :count] for values in self.probe_truth))
         if place == "known":
             return self._truth(technique.knows)
-        return Truth(*(part[self.receivers.own] for part in self.truth)) if place == "own_normals" else self.truth
+        return Truth(*(values[self.receivers.own] for values in self.truth)) if place == "own_normals" else self.truth
 
     def _errors(self, place: str, estimate: np.ndarray, technique: Technique) -> Errors:
         truth = self.truth_for(place, estimate, technique)
@@ -195,15 +213,23 @@ class Yard:
 
     def _truth(self, what, progress: Progress | None = None) -> Truth:
         if what not in self._truths:
-            progress = progress or Progress()
-            if what == "probes":
-                truth = self.reference.probes(self.probe_points, PROBE_ORDER, progress)
-            elif what == KNOWN_LIGHT:
-                truth = self.reference.irradiance(self.receivers, progress)
+            name = f"reference, {what if what == 'probes' else ', '.join(sorted(what))}"
+            stored = None if self._keep is None else self._keep.load(name)
+            if stored is None:
+                truth = self._traced(what, progress or Progress())
+                if self._keep is not None:
+                    self._keep.save(name, truth._asdict())
             else:
-                truth = self.path_reference.irradiance(self.receivers, progress, what)
+                truth = Truth(**stored[0])
             self._truths[what] = truth
         return self._truths[what]
+
+    def _traced(self, what, progress: Progress) -> Truth:
+        if what == "probes":
+            return self.reference.probes(self.probe_points, PROBE_ORDER, progress)
+        if what == KNOWN_LIGHT:
+            return self.reference.irradiance(self.receivers, progress)
+        return self.path_reference.irradiance(self.receivers, progress, what)
 
 
 def scaled_resolution(resolution: tuple[int, int, int], factor: float) -> tuple[int, int, int]:

@@ -2,7 +2,7 @@
 
 Arrays are SH coefficients (n, k, 3) or irradiances (n, 3): the first axis counts probes or points, and all that follows belongs
 to one of them. Sums are in float64. ``variance`` is the squared standard error of the reference (plus the estimate's, if it is to
-be forgiven as well), of the arrays' shape. Definitions: PHYSICS §4.
+be forgiven as well), of the arrays' shape. Definitions, x for the estimate and r for the reference: docs/physics.md §4.
 """
 
 from typing import NamedTuple
@@ -13,6 +13,8 @@ from ..numerics.sampling import hash_u32
 
 # Resamples of the bootstrap, and their seed.
 RESAMPLES, BOOTSTRAP_SEED = 400, 7
+# Signed errors are relative to the truth, or to this share of its mean where that is more.
+FAINT = 0.1
 
 
 class Figure(NamedTuple):
@@ -32,6 +34,40 @@ def relative_rmse_figure(estimate, reference, variance=None) -> Figure:
     """``relative_rmse`` with a standard error from a bootstrap over probes."""
     squared, power = _relative_sums(estimate, reference, variance)
     return _bootstrap(lambda rows: _root_ratio(squared[rows].sum(), power[rows].sum()), len(squared))
+
+
+def relative_rmse_of_sites(parts) -> Figure:
+    """``relative_rmse_figure`` over several kinds of places together: ``parts`` are (estimate, reference, variance) of (n, …) each,
+    with an n and a shape of their own; each first axis counts sites that weigh the same, however many values they have. The
+    bootstrap draws among all of them."""
+    sums = [np.array(_relative_sums(*part)) / max(1, np.asarray(part[0])[0].size) for part in parts if len(part[0])]
+    squared, power = (np.concatenate(arrays) for arrays in zip(*sums, strict=True))
+    return _bootstrap(lambda rows: _root_ratio(squared[rows].sum(), power[rows].sum()), len(squared))
+
+
+def noise_of_sites(parts) -> float:
+    """The standard error that noise alone gives ``relative_rmse_of_sites`` of ``parts`` at these very sites: of squares of normal
+    differences, whose variance is 4 d² σ² + 2 σ⁴."""
+    spread = error = power = 0.0
+    for estimate, reference, variance in parts:
+        if not len(estimate):
+            continue
+        values = np.asarray(estimate)[0].size
+        squared, square = _relative_sums(estimate, reference, variance)
+        differences, noise = np.square(np.subtract(estimate, reference)), np.broadcast_to(variance, np.shape(estimate))
+        spread += float(np.sum(4.0 * np.maximum(differences - noise, 0.0) * noise + 2.0 * noise**2)) / values**2
+        error, power = error + float(squared.sum()) / values, power + float(square.sum()) / values
+    if power <= 0.0:
+        return 0.0
+    value, added = _root_ratio(error, power), np.sqrt(spread) / power
+    # Where hardly anything differs the root is not linear: there it is the root of what noise adds.
+    return float(min(added / (2.0 * value), np.sqrt(added))) if value > 0.0 else float(np.sqrt(added))
+
+
+def signed_error(estimate: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    """(x − r)/max(r, FAINT·mean r), (n,) from luminances (n,): positive is too bright. Without any light, x itself."""
+    level = FAINT * float(truth.mean())
+    return (estimate - truth) / np.maximum(truth, level) if level > 0 else estimate
 
 
 def relmse(estimate, reference, epsilon: float = 1e-2) -> float:
@@ -54,9 +90,9 @@ def signed_bias(estimate, reference) -> Figure:
     if total == 0.0:
         return Figure(0.0 if not np.any(x) else np.inf, np.nan)
     value = float((x - r).sum() / total)
-    n = len(r)
+    count = len(r)
     residual = (x - r) - value * r
-    error = np.sqrt(n / (n - 1) * np.sum(residual**2)) / abs(total) if n > 1 else np.nan
+    error = np.sqrt(count / (count - 1) * np.sum(residual**2)) / abs(total) if count > 1 else np.nan
     return Figure(value, float(error))
 
 

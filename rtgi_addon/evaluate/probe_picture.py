@@ -5,23 +5,25 @@ Surfaces show emission + albedo/π·(E of the field + E of the lamps with their 
 seen on both. Probes inside geometry are dark red with stripes.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from ..numerics import sh
-from ..numerics.grid import cell_size, lattice_points
+from ..numerics.colour import srgb_from_linear
+from ..numerics.grid import UNIT_BOX, cell_size, lattice_points
 from ..numerics.sampling import sobol_owen
 from ..progress import Progress
 from ..scene import Scene
+from ..scene.lights import lamps_to_add
+from ..storage.png import write_png
 from ..techniques import Field, ProbeGrid
-from ..techniques.base import BACKFACE_THRESHOLD
 from ..transport.context import LightContext
-from ..transport.direct import lamp_irradiance
 from ..transport.parallel import chunks, parallel_for
-from ..transport.rays import offset_origins
+from ..transport.paths.direct import Receiver, lamp_irradiance
+from ..transport.rays.tracer import offset_origins
 from ..transport.vectors import dot, luminance
-from .png import write_png
 from .view import View, choose_view
 
 RADIUS_IN_CELLS = 0.13
@@ -29,7 +31,10 @@ RADIUS_IN_CELLS = 0.13
 NEAREST_IN_RADII = 6.0
 # Places within a pixel of the four samples that smooth edges: a rotated grid.
 SUBPIXELS = ((0.375, 0.125), (0.875, 0.375), (0.625, 0.875), (0.125, 0.625))
-LAMP_SAMPLES = 4
+# Samples of lamps for each of them, and the seed of their numbers.
+LAMP_SAMPLES, SEED = 4, 0
+# The stripes of invalid probes, so many across a sphere's radius and a bit more; and what is drawn where nothing is.
+STRIPES = 4.0
 INVALID_COLOURS = np.array([[0.16, 0.004, 0.004], [0.05, 0.001, 0.001]], np.float32)
 BACKDROP = 0.012
 # Exposure puts this share of what is drawn below the level where highlights begin to be rolled off.
@@ -42,15 +47,14 @@ class Probes:
 
     def __init__(self, grids: tuple[ProbeGrid, ...]):
         size = max(grid.sh.shape[3] for grid in grids)
-        parts = []
+        rows = []
         for grid in grids:
             points = lattice_points(grid.volume.world_from_local, grid.volume.resolution) + grid.offset_world
-            moved = np.any(grid.offset_world != 0, axis=-1)
             padded = np.pad(grid.sh, [(0, 0)] * 3 + [(0, size - grid.sh.shape[3]), (0, 0)])
-            radius = RADIUS_IN_CELLS * cell_size(grid.volume.world_from_local, grid.volume.resolution).min()
-            invalid = (grid.validity < 1.0 - BACKFACE_THRESHOLD) & ~moved
-            parts.append((points.reshape(-1, 3), np.full(points.size // 3, radius), padded.reshape(-1, size, 3), invalid.ravel()))
-        self.centers, self.radii, self.coefficients, self.invalid = (np.concatenate(part) for part in zip(*parts, strict=True))
+            radius = RADIUS_IN_CELLS * cell_size(grid.volume.world_from_local, grid.volume.nodes).min()
+            counts = grid.counts
+            rows.append((points[counts], np.full(counts.sum(), radius), padded[counts], ~grid.in_the_open[counts]))
+        self.centers, self.radii, self.coefficients, self.invalid = (np.concatenate(column) for column in zip(*rows, strict=True))
         self.order = sh.order_of(size)
 
     def radiance(self, index: np.ndarray, normals: np.ndarray) -> np.ndarray:
@@ -61,7 +65,7 @@ class Probes:
 
     def stripes(self, normals: np.ndarray) -> np.ndarray:
         """The display colour (n, 3) of an invalid probe at ``normals`` (n, 3)."""
-        return INVALID_COLOURS[(np.floor((normals[:, 0] + normals[:, 1] + normals[:, 2]) * 4.0).astype(np.int64)) % 2]
+        return INVALID_COLOURS[(np.floor((normals[:, 0] + normals[:, 1] + normals[:, 2]) * STRIPES).astype(np.int64)) % 2]
 
 
 def draw_probes(scene: Scene, field: Field, path, resolution: tuple[int, int] = (1280, 720), *, threads: int | None = None,
@@ -84,7 +88,7 @@ def draw_probes(scene: Scene, field: Field, path, resolution: tuple[int, int] = 
         shown = np.where(fixed[:, None], radiance, _rolled_off(radiance * exposure))
         picture = picture + np.where(drawn[:, None], shown, np.float32(BACKDROP))
     width, height = view.resolution
-    encoded = _srgb(picture / len(SUBPIXELS)).reshape(height, width, 3)
+    encoded = srgb_from_linear(np.clip(picture / len(SUBPIXELS), 0.0, 1.0)).reshape(height, width, 3)
     return write_png(path, np.round(encoded * 255.0).astype(np.uint8))
 
 
@@ -104,24 +108,26 @@ def _draw(view: View, context: LightContext, field: Field, probes: Probes, subfr
     on_sphere = np.flatnonzero(sphere >= 0)
     normals = origins[on_sphere] + depth[on_sphere, None] * directions[on_sphere] - probes.centers[sphere[on_sphere]]
     normals = (normals / probes.radii[sphere[on_sphere], None]).astype(np.float32)
-    for part in chunks(len(on_sphere)):
-        radiance[on_sphere[part]] = probes.radiance(sphere[on_sphere[part]], normals[part])
+    for span in chunks(len(on_sphere)):
+        radiance[on_sphere[span]] = probes.radiance(sphere[on_sphere[span]], normals[span])
     invalid = probes.invalid[sphere[on_sphere]]
     radiance[on_sphere[invalid]] = probes.stripes(normals[invalid])
     fixed[on_sphere[invalid]] = True
 
     on_surface = np.flatnonzero(hit & (sphere < 0))
-    parts = chunks(len(on_surface))
-    shifts = np.random.default_rng(0).random((len(origins), 3), np.float32)
+    spans = chunks(len(on_surface))
+    shifts = np.random.default_rng(SEED).random((len(origins), 3), np.float32)
 
     def shade(i):
-        rows = on_surface[parts[i]]
+        rows = on_surface[spans[i]]
         return _surface_radiance(context, field, directions[rows], hits.primitive[rows], hits.u[rows], hits.v[rows],
                                  subframe, shifts[rows])
 
-    colours_of_parts = parallel_for(shade, len(parts), context.threads, progress, "Drawing the probes")
-    for part, colours in zip(parts, colours_of_parts, strict=True):
-        radiance[on_surface[part]] = colours
+    shaded = parallel_for(shade, len(spans), context.threads, progress, "Drawing the probes")
+    for span, colours in zip(spans, shaded, strict=True):
+        radiance[on_surface[span]] = colours
+    if hits.tint is not None:
+        radiance[on_surface] *= hits.tint[on_surface]
     outside = np.flatnonzero(~hit & (sphere < 0) & np.any(directions != 0, axis=1))
     if not context.environment.is_black:
         radiance[outside] = context.environment.radiance(directions[outside])
@@ -134,26 +140,26 @@ def _spheres(view: View, probes: Probes, origins, directions, depth) -> tuple[np
 
     Each sphere meets only the rays of the pixels around it."""
     width, height = view.resolution
-    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-    pixels, w = view.project((probes.centers[:, None] + probes.radii[:, None, None] * corners).reshape(-1, 3))
-    pixels, w = pixels.reshape(-1, 8, 2), w.reshape(-1, 8)
+    corners = probes.centers[:, None] + probes.radii[:, None, None] * UNIT_BOX
+    pixels, w = view.project(corners.reshape(-1, 3))
+    pixels, w = pixels.reshape(-1, len(UNIT_BOX), 2), w.reshape(-1, len(UNIT_BOX))
     low = np.clip(np.floor(pixels.min(axis=1)) - 1, 0, (width, height)).astype(int)
     high = np.clip(np.ceil(pixels.max(axis=1)) + 1, 0, (width, height)).astype(int)
     sphere = np.full(len(origins), -1, np.int32)
     depth = depth.copy()
     shape = height, width
-    o, d = origins.reshape(*shape, 3), directions.reshape(*shape, 3)
+    starts, ways = origins.reshape(*shape, 3), directions.reshape(*shape, 3)
     sphere_image, depth_image = sphere.reshape(shape), depth.reshape(shape)
     eye = view.camera.world_from_camera[:3, 3]
     away = np.linalg.norm(probes.centers - eye, axis=1) > NEAREST_IN_RADII * probes.radii
     for index in np.flatnonzero(away & (w.min(axis=1) > 0) & np.all(high > low, axis=1)):
         window = (slice(low[index, 1], high[index, 1]), slice(low[index, 0], high[index, 0]))
-        towards = probes.centers[index].astype(np.float32) - o[window]
-        along = np.einsum("yxc,yxc->yx", towards, d[window])
-        aside = towards - along[..., None] * d[window]
+        towards = probes.centers[index].astype(np.float32) - starts[window]
+        along = np.einsum("yxc,yxc->yx", towards, ways[window])
+        aside = towards - along[..., None] * ways[window]
         room = np.float32(probes.radii[index] ** 2) - np.einsum("yxc,yxc->yx", aside, aside)
         t = along - np.sqrt(np.maximum(room, 0.0))
-        nearer = (room > 0) & (t > 0) & (t < depth_image[window]) & (np.abs(d[window]).max(axis=-1) > 0)
+        nearer = (room > 0) & (t > 0) & (t < depth_image[window]) & (np.abs(ways[window]).max(axis=-1) > 0)
         depth_image[window][nearer] = t[nearer]
         sphere_image[window][nearer] = index
     return sphere, depth
@@ -167,16 +173,20 @@ def _surface_radiance(context: LightContext, field: Field, directions, primitive
     shading = np.where(dot(shading, geometric)[:, None] < 0, -shading, shading)
     points = context.geometry.points(primitive, u, v)
     irradiance = np.asarray(field.irradiance(points, shading), np.float32)
-    if context.lamps.count and not field.includes_direct:
+    added = lamps_to_add(context.scene.lights, field.direct_lamps)
+    if added:
+        context = context if added is context.scene.lights else context.relit(replace(context.scene, lights=added))
         above = offset_origins(points, geometric, geometric)
         first = subframe * LAMP_SAMPLES
         last = first + (1 if context.lamps.count == 1 and context.lamps.is_delta[0] else LAMP_SAMPLES)
         # One low-discrepancy set over all samples of a pixel, shifted by the pixel's own random offset.
-        for numbers in sobol_owen(last, 3, seed=0)[first:]:
+        for numbers in sobol_owen(last, 3, seed=SEED)[first:]:
             shifted = (numbers + shifts) % np.float32(1.0)
-            irradiance = irradiance + lamp_irradiance(context, above, geometric, shading, shifted) / np.float32(last - first)
-    emitted = context.surfaces.emission(primitive, u, v)
-    return emitted + context.surfaces.albedo(primitive, u, v) * irradiance * np.float32(1.0 / np.pi)
+            light = lamp_irradiance(context, above, Receiver(shading, geometric, primitive), shifted)
+            irradiance = irradiance + light / np.float32(last - first)
+    cosine = -dot(context.geometry.normals_world[primitive], directions)
+    emitted = context.surfaces.emission(primitive, u, v, cosine)
+    return emitted + context.surfaces.albedo(primitive, u, v, cosine) * irradiance * np.float32(1.0 / np.pi)
 
 
 def _exposure(radiance: np.ndarray) -> np.float32:
@@ -189,9 +199,3 @@ def _rolled_off(value: np.ndarray) -> np.ndarray:
     """Linear up to the shoulder, then an exponential approach to 1: mid tones stay proportional to radiance."""
     over = np.maximum(value - SHOULDER, 0.0)
     return np.where(value <= SHOULDER, value, SHOULDER + (1.0 - SHOULDER) * (1.0 - np.exp(-over / (1.0 - SHOULDER))))
-
-
-def _srgb(linear: np.ndarray) -> np.ndarray:
-    """sRGB encoding of values in 0…1 (IEC 61966-2-1)."""
-    linear = np.clip(linear, 0.0, 1.0)
-    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)

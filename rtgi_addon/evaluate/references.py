@@ -1,7 +1,7 @@
 """What estimates are held against: irradiance at receivers and SH at probes, with the reference's own variance.
 
 ``PathReference`` is this project's path tracer. Anything else that keeps the protocol ``Reference`` can take its place, such as
-Cycles (blender/cycles_reference.py).
+Cycles (blender/cycles/reference.py).
 """
 
 from dataclasses import replace
@@ -10,15 +10,17 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from ..progress import Progress
-from ..scene import Channel, Scene, World
+from ..scene import Scene, World
 from ..techniques.base import KNOWN_LIGHT
 from ..transport.context import LightContext
-from ..transport.path import Estimate, irradiance_at, probe_sh
+from ..transport.paths.reference import Estimate, irradiance_at, probe_sh
 from .receivers import Receivers
 
 # Paths a point of the first round, from whose noise the number of all paths follows, and the most paths of all points together:
 # about a minute on two cores.
 PILOT_PATHS, MOST_PATHS = 512, 1 << 23
+# How far a reference is when its first round is traced.
+_PILOTED = 0.1
 
 
 class Truth(NamedTuple):
@@ -26,6 +28,11 @@ class Truth(NamedTuple):
 
     mean: np.ndarray
     variance: np.ndarray
+
+    @staticmethod
+    def of(estimate: Estimate) -> "Truth":
+        """The path tracer's ``estimate``."""
+        return Truth(estimate.mean.astype(np.float64), estimate.standard_error.astype(np.float64) ** 2)
 
     @property
     def noise(self) -> float:
@@ -40,7 +47,7 @@ class Reference(Protocol):
     kind: str
 
     def irradiance(self, receivers: Receivers, progress: Progress) -> Truth:
-        """Irradiance (n, 3) [W·m⁻²] at ``receivers``, of all indirect light (PHYSICS.md §1)."""
+        """Irradiance (n, 3) [W·m⁻²] at ``receivers``, of all indirect light (docs/physics.md §1)."""
 
     def probes(self, points: np.ndarray, order: int, progress: Progress) -> Truth:
         """SH (n, (order + 1)², 3) of what arrives at free ``points`` (n, 3)."""
@@ -78,24 +85,18 @@ class PathReference:
     def _refined(self, trace, points: int, progress: Progress) -> Truth:
         most = max(self.most_paths // max(points, 1), 1)
         pilot_paths = min(PILOT_PATHS, most)
-        pilot = _truth(trace(pilot_paths, self.seed, progress.span(0.0, 0.1)))
+        pilot = Truth.of(trace(pilot_paths, self.seed, progress.span(0.0, _PILOTED)))
         missing = pilot_paths * ((pilot.noise / self.noise) ** 2 - 1.0)
         paths = int(min(missing, most - pilot_paths))
         if paths <= 0:
             return pilot
-        rest = _truth(trace(paths, self.seed + 1, progress.span(0.1, 1.0)))
+        rest = Truth.of(trace(paths, self.seed + 1, progress.span(_PILOTED, 1.0)))
         share = np.float64(pilot_paths / (pilot_paths + paths))
         return Truth(share * pilot.mean + (1 - share) * rest.mean, share**2 * pilot.variance + (1 - share) ** 2 * rest.variance)
 
 
 def limited(scene: Scene, knows: frozenset[str]) -> Scene:
     """``scene`` with only the light sources in ``knows`` (a part of KNOWN_LIGHT)."""
-    black = Channel.of(0.0)
-    materials = scene.materials if "emissive surfaces" in knows else \
-        tuple(replace(material, emission=black) for material in scene.materials)
+    materials = scene.materials if "emissive surfaces" in knows else tuple(material.shining(0.0) for material in scene.materials)
     return replace(scene, lights=scene.lights if "lamps" in knows else (), materials=materials,
                    world=scene.world if "world" in knows else World.constant(0.0))
-
-
-def _truth(estimate: Estimate) -> Truth:
-    return Truth(estimate.mean.astype(np.float64), estimate.standard_error.astype(np.float64) ** 2)

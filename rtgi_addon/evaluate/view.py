@@ -5,19 +5,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..numerics.grid import cell_size, lattice_points, transform_points
+from ..numerics.grid import box_corners, transform_points
 from ..scene import Camera, Scene
+from ..techniques.lattice.focus import probes_of, spacing_of
 from ..transport.context import LightContext
+from ..transport.views.camera import CameraView
 
 # The scene's own camera is taken if it shows at least this share of the probes, a made-up one if it shows that share; below it,
 # whatever stands in front is cut away.
 ENOUGH, ENOUGH_FROM_OUTSIDE = 0.25, 0.75
+# A made-up camera: its frame's height, how high it stands, from where it is tried, and how much of the frame the volumes fill.
 FIELD_OF_VIEW = np.radians(40.0)
 ELEVATION = np.radians(22.0)
 AZIMUTHS = np.radians(np.arange(-60.0, 300.0, 45.0))
-MOST_PROBES_TRIED = 2000
 FRAME_FILLED = 0.92
-UNIT_BOX = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float64)
+# So many probes, about, tell what a view shows.
+MOST_PROBES_TRIED = 2000
+# What a made-up camera sees begins and ends at these factors of its distance.
+_NEAR, _FAR = 0.01, 100.0
+# The walls are cut this share of a cell outside the outermost probes.
+_CUT = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,14 +41,7 @@ class View:
 
         With a section, rays start where they enter its box; those that pass beside it point nowhere (direction 0)."""
         width, height = self.resolution
-        world_from_clip = self.camera.world_from_camera @ np.linalg.inv(self.camera.clip_from_camera)
-        # A plane of constant depth is affine in the pixel for every projection a camera has: three of its points say it all.
-        frame = np.array([[a, b, depth] for depth in (-1, 1) for a, b in ((-1, 1), (1, 1), (-1, -1))])
-        corners = _homogeneous(world_from_clip, frame)
-        across, down = (x / width)[:, None], (y / height)[:, None]
-        near, far = (c[0] + across * (c[1] - c[0]) + down * (c[2] - c[0]) for c in corners.reshape(2, 3, 3))
-        directions = far - near
-        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        near, directions, _ = CameraView.of(self.camera).through(x / width, 1.0 - y / height)
         if self.section is not None:
             start = self._entry(near, directions)
             reached = np.isfinite(start)
@@ -52,40 +52,32 @@ class View:
     def project(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Pixel coordinates (n, 2), y down, and depth w (n,) of world ``points``; not in front of the camera where w ≤ 0."""
         width, height = self.resolution
-        clip_from_world = self.camera.clip_from_camera @ np.linalg.inv(self.camera.world_from_camera)
-        clip = points @ clip_from_world[:, :3].T + clip_from_world[:, 3]
-        w = clip[:, 3]
-        ndc = clip[:, :2] / np.where(np.abs(w) > 1e-12, w, 1e-12)[:, None]
-        return np.stack([(ndc[:, 0] + 1) * 0.5 * width, (1 - ndc[:, 1]) * 0.5 * height], axis=1), w
+        place, w = CameraView.of(self.camera).project(points)
+        return np.stack([place[:, 0] * width, (1 - place[:, 1]) * height], axis=1), w
 
     def _entry(self, origins, directions) -> np.ndarray:
         """Where (n,) rays enter the section's box (0 for origins inside), infinite if they pass beside it: the slab test."""
         local_from_world = np.linalg.inv(self.section)
-        o = transform_points(local_from_world, origins)
-        d = directions @ local_from_world[:3, :3].T
-        d = np.where(np.abs(d) > 1e-12, d, 1e-12)
-        first, second = (-1.0 - o) / d, (1.0 - o) / d
+        start = transform_points(local_from_world, origins)
+        way = directions @ local_from_world[:3, :3].T
+        way = np.where(np.abs(way) > 1e-12, way, 1e-12)
+        first, second = (-1.0 - start) / way, (1.0 - start) / way
         entry = np.maximum(np.minimum(first, second).max(axis=1), 0.0)
         return np.where(entry < np.maximum(first, second).min(axis=1), entry, np.inf)
 
 
-def _homogeneous(matrix, points) -> np.ndarray:
-    result = points @ matrix[:, :3].T + matrix[:, 3]
-    return result[:, :3] / result[:, 3:]
-
-
 def choose_view(scene: Scene, context: LightContext, resolution: tuple[int, int]) -> View:
     """The view that shows the probes of ``scene`` best, at most ``resolution`` (width, height) pixels large."""
-    points = np.concatenate([lattice_points(v.world_from_local, v.resolution).reshape(-1, 3) for v in scene.volumes])
+    points = probes_of(scene.volumes)
     tried = points[::max(1, len(points) // MOST_PROBES_TRIED)]
-    own = [View(camera, _fitted_size(camera.resolution, resolution)) for camera in scene.cameras[:1]]
-    for view in own:
+    for camera in scene.cameras[:1]:
+        view = View(camera, _fitted_size(camera.resolution, resolution))
         framed, seen = _shown(view, context, tried)
         if seen >= ENOUGH:
             return view
         if framed >= 2 * ENOUGH:
-            return View(view.camera, view.resolution, _section(scene, points))
-    corners = np.concatenate([transform_points(v.world_from_local, UNIT_BOX) for v in scene.volumes])
+            return View(camera, view.resolution, _section(scene, points))
+    corners = np.concatenate([box_corners(volume.world_from_local) for volume in scene.volumes])
     around = [View(_orbit(corners, azimuth, resolution), resolution) for azimuth in AZIMUTHS]
     shares = [_shown(view, context, tried)[1] for view in around]
     best = around[int(np.argmax(shares))]
@@ -106,8 +98,8 @@ def _section(scene: Scene, points: np.ndarray) -> np.ndarray:
     """A box a quarter of a cell outside the outermost probes: nearer than any wall they keep half a cell from."""
     if len(scene.volumes) == 1:
         volume = scene.volumes[0]
-        return np.asarray(volume.world_from_local, np.float64) @ np.diag([*(1.0 - 0.5 / np.array(volume.resolution)), 1.0])
-    margin = 0.25 * min(cell_size(v.world_from_local, v.resolution).min() for v in scene.volumes)
+        return np.asarray(volume.world_from_local, np.float64) @ np.diag([*(1.0 - 2.0 * _CUT / np.array(volume.resolution)), 1.0])
+    margin = _CUT * spacing_of(scene.volumes)
     low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
     box = np.diag([*(0.5 * (high - low)), 1.0])
     box[:3, 3] = 0.5 * (low + high)
@@ -128,7 +120,7 @@ def _orbit(corners, azimuth: float, resolution) -> Camera:
     world_from_camera = np.eye(4)
     world_from_camera[:3, :3] = np.stack([right, up, back], axis=1)
     world_from_camera[:3, 3] = center + back * distance
-    near, far = 0.01 * distance, 100.0 * distance
+    near, far = _NEAR * distance, _FAR * distance
     clip_from_camera = np.array([
         [height / (width * half), 0, 0, 0], [0, 1 / half, 0, 0],
         [0, 0, -(far + near) / (far - near), -2 * far * near / (far - near)], [0, 0, -1, 0]])

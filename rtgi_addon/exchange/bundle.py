@@ -1,120 +1,195 @@
-"""The bake bundle (FORMATS.md): write it whole or not at all, check it, read it back.
+"""The bake bundle (docs/formats.md): write it whole or not at all, check it, read it back.
 
-The same bake gives the same bytes in every file; what differs from run to run (seconds, memory) is confined to `stats` in
-`bake.json`.
+The same bake gives the same bytes in every file; what differs from run to run (seconds, memory, and with them the checksum of
+`bake.json`) is confined to `stats` in it.
 """
 
 import hashlib
-import json
-import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
+from ..effects.atlas.sheet import LightAtlas
+from ..effects.spheres.maps import SphereProbes
 from ..errors import BakeError
-from ..scene import ProbeVolume, Scene
+from ..machine.memory import available_bytes
+from ..progress import Progress
+from ..scene import Medium, ProbeVolume, Scene
+from ..scene.scattered import named, of_grid
+from ..storage.files import disk_error
+from ..storage.inventory import BYSTANDERS, Stranger, first_stranger
+from ..storage.parse import require_inside
+from ..storage.paths import check_output, resolved
+from ..storage.reading import open_file, read_file, sha256_of_file
+from ..storage.workplace import Workplace, replaced_of, workplace
+from ..storage.writing import write_file
 from ..techniques import Field, ProbeGrid
-from ..techniques.lpv.field import LpvField
-from ..techniques.probes.field import ProbeField
+from ..techniques.lattice.field import ProbeField
+from ..techniques.transfer.field import TransferField
+from ..techniques.voxels.shipped import ShippedVoxels
 from . import flipbook
-from .exr import read_exr, write_exr
-from .files import disk_error, recover_swap, remove_folder, sibling, swap_folder, sync_file, sync_folder, write_atomically
-from .lpv_volume import FOLDER as LPV_FOLDER
-from .lpv_volume import INDEX as LPV_INDEX
-from .lpv_volume import write_lpv_volume
+from .atlas_files import read_atlas
+from .bundle_media import read_media
+from .bundle_parts import parts_of
+from .bundle_volume import write_volume
+from .exr import decode_exr, largest_file, require_image
 from .names import folder_names
 from .plain import plain
-from .schema import MANIFEST, RESTORE, RTGI_VERSION, SAMPLE_PLACEMENT, SCHEMA, SH_CONVENTION, files_of, read_manifest
+from .roles import direct_lamps, lamp_roles, object_roles
+from .schema import (
+    CHECKSUM,
+    FITTED,
+    MANIFEST,
+    NO_CHECKSUM,
+    RESTORE,
+    RTGI_VERSION,
+    SCHEMA,
+    SH_CONVENTION,
+    files_of,
+    image_header,
+    manifest_bytes,
+    read_manifest,
+    volume_bytes,
+)
+from .sphere_files import read_spheres
+from .transfer_files import read_transfer
+from .voxel_files import read_voxels
 
-# Left by file browsers in any folder they show; no reason to refuse replacing a bundle.
-_BYSTANDERS = {".DS_Store", "Thumbs.db", "desktop.ini"}
+_Read = TypeVar("_Read")
 
 
 @dataclass(frozen=True, eq=False)
 class Bundle:
-    """A bundle read back: ``manifest`` is the checked `bake.json`, ``grids`` the volumes in its order."""
+    """A bundle read back: ``manifest`` is the checked `bake.json`, ``grids`` the volumes in its order, ``media`` what fills space
+    between surfaces, everywhere or on grids, ``spheres`` what sphere probes saw, ``atlas`` light at the texels of UV maps,
+    ``voxels`` the scene as lit voxels."""
 
     path: Path
     manifest: dict
     grids: tuple[ProbeGrid, ...]
+    media: tuple[Medium, ...] = ()
+    spheres: SphereProbes | None = None
+    atlas: LightAtlas | None = None
+    voxels: ShippedVoxels | None = None
+
+    @property
+    def unchecked(self) -> tuple[str, ...]:
+        """What reading it could not make sure of, as notes for the user."""
+        return () if CHECKSUM in self.manifest["stats"] else (NO_CHECKSUM,)
 
     @property
     def field(self) -> ProbeField:
         """The probes as a field, whichever technique they were sampled from: what an engine that reads the bundle shows."""
-        return ProbeField(self.grids, includes_direct=bool(self.manifest.get("includes_direct")))
+        return self._with_others(ProbeField(self.grids, direct_lamps=direct_lamps(self.manifest)))
+
+    @property
+    def transfer_field(self) -> TransferField:
+        """The probes with what they make of any light, read from the disk now. Raises BakeError for a bundle without transfer, and
+        for files that are missing or damaged."""
+        if "transfer" not in self.manifest:
+            relit = "relit" in self.manifest["stats"]
+            if relit:
+                raise BakeError(f"{self.path} holds no transfer, it was relit", "give the bundle that it was relit from")
+            raise BakeError(f"{self.path} holds no transfer, it was baked with {self.manifest['technique']}",
+                            "bake it with --technique transfer")
+        return self._with_others(TransferField(read_transfer(self.path, self.grids), direct_lamps=direct_lamps(self.manifest),
+                                                params=self.manifest["settings"]))
+
+    def _with_others(self, field: Field) -> Field:
+        field.spheres, field.atlas = self.spheres, self.atlas
+        return field
 
 
-def check_target(out) -> Path:
-    """The absolute path of a bundle to be written to ``out``, after a swap that was interrupted is mended.
+def check_target(out, *, inputs=(), others=(), size: int = 0) -> Path:
+    """The absolute path of a bundle of at least ``size`` bytes to be written to ``out``, while ``inputs`` are read and beside the
+    ``others`` of the same run.
 
-    Raises BakeError if the parent folder is missing, or if ``out`` exists and holds anything but a bundle.
+    Raises BakeError for a path that will not do (``check_output``), and if ``out`` holds anything but a bundle as it was written.
     """
-    path = Path(out).expanduser().resolve()
-    if not path.parent.is_dir():
-        raise BakeError(f"the folder {path.parent} does not exist", "create it first, or choose another --out")
-    try:
-        recover_swap(path)
-        if path.exists() and not path.is_dir():
-            raise BakeError(f"{path} is a file", "choose a folder as --out")
-        stranger = _stranger(path) if path.is_dir() else None
-    except OSError as error:
-        raise disk_error(path, error) from error
-    if stranger is not None:
-        raise BakeError(f"{path} holds {stranger}, which is not part of a bundle",
-                        "choose another --out, or move that away: the whole folder is replaced")
+    path = check_output(out, replaced=True, inputs=inputs, others=others, size=size)
+    replaceable(path)
     return path
 
 
-def _stranger(folder: Path) -> str | None:
-    """The first thing in ``folder`` that no bundle of ours put there, or None."""
-    if not (folder / MANIFEST).is_file():
-        return next((item.name for item in folder.iterdir() if item.name not in _BYSTANDERS), None)
+def least_bytes(volumes, order: int, cell: int) -> int:
+    """The bytes that a bundle of ``volumes`` takes at least: probes of SH order ``order`` with visibility maps of ``cell`` texels a
+    side. Compressed, that is: light that is the same everywhere takes a tenth of its numbers, any other more."""
+    probes = sum(int(np.prod(volume.resolution, dtype=np.int64)) for volume in volumes)
+    return 4 * probes * (3 * (order + 1) ** 2 + 2 * cell**2 + 1) // 10
+
+
+def replaceable(path: Path, contents: bool = True) -> dict[str, str]:
+    """What of the folder ``path`` is a bundle's (name → checksum), which must be all of it; ``contents`` also compares checksums.
+
+    Raises BakeError for anything that is not of a bundle, that was changed since it was written, or that cannot be read.
+    """
     try:
-        ours = {MANIFEST, *read_manifest(folder)["sha256"]}
+        if not path.is_dir():
+            return {}
+        if not (path / MANIFEST).is_file():
+            stranger = next((item.name for item in sorted(path.iterdir()) if item.name not in BYSTANDERS), None)
+            ours = {}
+        else:
+            ours = {**_manifest_to_replace(path)["sha256"], MANIFEST: sha256_of_file(path / MANIFEST)}
+            stranger = first_stranger(path, ours, contents)
+    except OSError as error:
+        raise disk_error(path, error) from error
+    if isinstance(stranger, Stranger) and stranger.changed:
+        raise BakeError(f"{path} holds {stranger.name}, which was changed since it was baked",
+                        "choose another --out, or move that folder away")
+    if stranger is not None:
+        name = stranger.name if isinstance(stranger, Stranger) else stranger
+        raise BakeError(f"{path} holds {name}, which is not part of a bundle",
+                        "choose another --out, or move that away: the whole folder is replaced")
+    return ours
+
+
+def _manifest_to_replace(path: Path) -> dict:
+    try:
+        return read_manifest(path)
     except BakeError as error:
-        raise BakeError(f"{folder} would be replaced and is no bundle this version can read, {error.cause}",
+        raise BakeError(f"{path} would be replaced and is no bundle this version can read, {error.cause}",
                         "choose another --out, or remove that folder") from error
-    files = (item for item in folder.rglob("*") if not item.is_dir() and item.name not in _BYSTANDERS)
-    return next((name for name in (item.relative_to(folder).as_posix() for item in files) if name not in ours), None)
 
 
 def write_bundle(out, field: Field, scene: Scene, *, settings: dict, seed: int, stats: Callable[[], dict],
-                 notes=()) -> Path:
-    """Write the grids of ``field`` as the bundle ``out`` and return its path.
+                 notes=(), not_followed=(), roles: tuple[dict, dict] | None = None) -> Path:
+    """Write the grids of ``field`` as the bundle ``out`` (a path, or its Workplace) and return its path.
 
+    ``roles`` (None: those of ``scene``) are those of lamps and of objects, where the scene itself is not known.
+    ``notes`` are lines for people, ``not_followed`` JSON-able entries about what the file holds and the bake does not follow;
     ``stats`` is called last, so that it can hold the seconds of this very writing.
     Everything is written and flushed to a folder beside ``out`` first, which then takes its place in one step: whatever
     happens before leaves an earlier bundle as it was. Raises BakeError for a disk that refuses and for values that are not
     finite.
     """
-    path = check_target(out)
-    new = sibling(path, "rtgi-new")
-    try:
-        remove_folder(new)
-        new.mkdir()
-        _write_files(new, field, scene, settings, seed, stats, notes)
-        swap_folder(new, path)
-    except OSError as error:
-        raise disk_error(path, error) from error
-    finally:
-        shutil.rmtree(new, ignore_errors=True)
-    return path
+    path = out if isinstance(out, Workplace) else check_target(out)
+    with workplace(path, "bake") as place:
+        try:
+            _write_files(place.new, field, scene, settings, seed, stats, notes, not_followed, roles)
+            stranger = place.put_folder(replaceable(place.path, contents=False))
+        except OSError as error:
+            raise disk_error(place.path, error) from error
+    if stranger is not None:
+        raise BakeError(f"{place.path} was replaced while somebody put {stranger.name} there",
+                        f"the new bundle is whole; take what you need of {place.folder}, and remove that")
+    return place.path
 
 
-def _write_files(folder: Path, field: Field, scene: Scene, settings: dict, seed: int, stats, notes) -> None:
+def _write_files(folder: Path, field: Field, scene: Scene, settings: dict, seed: int, stats, notes, not_followed,
+                 roles) -> None:
     grids = field.grids()
-    reserved = [MANIFEST, LPV_FOLDER] if isinstance(field, LpvField) else [MANIFEST]
+    parts = parts_of(field, scene)
+    reserved = [MANIFEST, *(part.folder for part in parts)]
     folders = folder_names([grid.volume.name for grid in grids], reserved=reserved)
-    volumes = [_write_volume(folder, name, grid) for name, grid in zip(folders, grids, strict=True)]
-    digests = {name: _sha256(folder / name) for volume in volumes for name in files_of(volume)}
-    more = {}
-    if isinstance(field, LpvField):
-        digests |= {name: _sha256(folder / name) for name in write_lpv_volume(folder, field)}
-        more["lpv"] = LPV_INDEX
-    for name in folders:
-        sync_folder(folder / name)
+    volumes = [write_volume(folder, name, grid) for name, grid in zip(folders, grids, strict=True)]
+    files = [name for volume in volumes for name in files_of(volume)]
+    lamps, objects = roles or (lamp_roles(scene, field), object_roles(scene))
+    for part in parts:
+        files += part.write(folder)
     manifest = {
         "schema": SCHEMA,
         "scene": scene.name,
@@ -124,142 +199,167 @@ def _write_files(folder: Path, field: Field, scene: Scene, settings: dict, seed:
         "settings": plain(settings),
         "seed": seed,
         "includes_direct": bool(field.includes_direct),
+        "lamps": lamps,
+        "objects": objects,
         "sh_convention": SH_CONVENTION,
         "volumes": volumes,
-        **more,
+        **{part.key: part.index for part in parts},
         "notes": list(notes),
-        "sha256": digests,
+        "not_followed": plain(list(not_followed)),
+        "sha256": {name: sha256_of_file(folder / name) for name in files},
+        "bytes": {name: (folder / name).stat().st_size for name in files},
         "stats": plain(stats()),
     }
-    write_atomically(folder / MANIFEST, (json.dumps(manifest, indent=1, allow_nan=False) + "\n").encode())
-    sync_folder(folder)
-
-
-def _write_volume(bundle: Path, folder: str, grid: ProbeGrid) -> dict:
-    """Write one volume's images into ``bundle``/``folder`` and return its entry for the manifest."""
-    volume = grid.volume
-    _require_finite(grid)
-    (bundle / folder).mkdir()
-    resolution = [int(n) for n in volume.resolution]
-    cell = grid.visibility.shape[3]
-    tiles, visibility_tiles = flipbook.layout(resolution), flipbook.layout(resolution, cell)
-    entry = {
-        "name": volume.name,
-        "resolution": resolution,
-        "world_from_local": np.asarray(volume.world_from_local, np.float64).tolist(),
-        "sample_placement": SAMPLE_PLACEMENT,
-        "fitted": bool(volume.fitted),
-        "sh_order": grid.order,
-        "tiles": tiles._asdict(),
-        "sh": [f"{folder}/sh{index}.exr" for index in range(grid.sh.shape[3])],
-        "visibility": f"{folder}/visibility.exr",
-        "visibility_size": cell,
-        "visibility_tiles": visibility_tiles._asdict(),
-        "validity": f"{folder}/validity.exr",
-    }
-    alone = {"schema": SCHEMA, "volume": volume.name, "sh_convention": SH_CONVENTION,
-             **{key: entry[key] for key in ("resolution", "world_from_local", "sample_placement", "sh_order", "tiles")}}
-
-    def write(name: str, kind: str, names: str, sheet: np.ndarray, **more) -> None:
-        write_exr(bundle / name, {letter: sheet[..., index] for index, letter in enumerate(names)},
-                  {**alone, "kind": kind, **more})
-        sync_file(bundle / name)
-
-    for index, name in enumerate(entry["sh"]):
-        write(name, "sh", "RGB", flipbook.to_sheet(grid.sh[:, :, :, index], tiles), coefficient=index)
-    write(entry["visibility"], "visibility", "RG", flipbook.octahedral_to_sheet(grid.visibility, visibility_tiles),
-          tiles=entry["visibility_tiles"], visibility_size=cell)
-    write(entry["validity"], "validity", "Y", flipbook.to_sheet(grid.validity[..., None], tiles))
-    if np.any(grid.offset_world != 0):
-        entry["offset"] = f"{folder}/offset.exr"
-        write(entry["offset"], "offset", "RGB", flipbook.to_sheet(grid.offset_world, tiles))
-    if not np.all(np.isnan(grid.standard_error)):
-        entry["standard_error"] = f"{folder}/standard_error.exr"
-        write(entry["standard_error"], "standard_error", "Y", flipbook.to_sheet(grid.standard_error[..., None], tiles))
-    return entry
-
-
-def _require_finite(grid: ProbeGrid) -> None:
-    for kind in ("sh", "visibility", "validity", "offset_world"):
-        values = getattr(grid, kind)
-        bad = ~np.isfinite(values).reshape(*values.shape[:3], -1).all(axis=-1)
-        if bad.any():
-            first = tuple(int(index) for index in np.argwhere(bad)[0][::-1])
-            raise BakeError(f"volume {grid.volume.name!r}: {kind} is not finite at {int(bad.sum())} probes, first at {first}",
-                            "look for infinite light strengths in the scene, and report this with the file")
+    write_file(folder / MANIFEST, manifest_bytes(manifest))
 
 
 def check_bundle(path) -> dict:
-    """The manifest of the bundle at ``path`` after every file's checksum was compared. Raises BakeError naming the first file
-    that is missing or differs."""
-    path = _located(path)
-    manifest = read_manifest(path)
-    for name, digest in manifest["sha256"].items():
-        file = path / name
-        if not file.is_file():
-            raise BakeError(f"{file} is missing", RESTORE)
+    """The manifest of the bundle at ``path`` after every file's size and checksum was compared. Raises BakeError naming the first
+    file that is missing or differs."""
+    return _of_one_bake(path, _checked)
+
+
+def read_bundle(path, progress: Progress | None = None) -> Bundle:
+    """Check and read the bundle at ``path``. Raises BakeError naming the file for anything missing, damaged, of another size or
+    place than `bake.json` says, or not finite, and for volumes that do not fit into memory; Cancelled."""
+    progress = progress or Progress()
+    return _of_one_bake(path, lambda place: _read(place, progress))
+
+
+def _of_one_bake(path, read: Callable[[Path], _Read]) -> _Read:
+    """What ``read`` makes of the bundle at ``path``; read again where a bake put another one there meanwhile: what is of both is
+    neither's fault. Raises what ``read`` raises of a bundle that stayed."""
+    while True:
+        place = _located(path)
+        before = _identity(place)
         try:
-            found = _sha256(file)
-        except OSError as error:
-            raise disk_error(file, error, doing="read") from error
-        if found != digest:
-            raise BakeError(f"{file} is cut short or damaged, its checksum is not the one in {MANIFEST}", RESTORE)
+            return read(place)
+        except BakeError:
+            if _identity(_located(path)) == before:
+                raise
+
+
+def _checked(path: Path) -> dict:
+    manifest = read_manifest(path)
+    for name in manifest["sha256"]:
+        _check_file(path, manifest, name)
     return manifest
 
 
-def read_bundle(path) -> Bundle:
-    """Check and read the bundle at ``path``. Raises BakeError naming the file for anything missing, damaged, of another size
-    than `bake.json` says, or not finite."""
-    path = _located(path)
-    manifest = check_bundle(path)
-    return Bundle(path, manifest, tuple(_read_volume(path, entry) for entry in manifest["volumes"]))
+def _read(path: Path, progress: Progress) -> Bundle:
+    manifest = read_manifest(path)
+    _require_memory(path, manifest)
+    grids = tuple(_read_volume(path, manifest, entry, progress) for entry in manifest["volumes"])
+    for name in manifest["sha256"].keys() - {name for entry in manifest["volumes"] for name in files_of(entry)}:
+        _check_file(path, manifest, name)
+    return Bundle(path, manifest, grids, read_media(path, manifest["sha256"]) if "media" in manifest else (),
+                  read_spheres(path, manifest["sha256"]) if "spheres" in manifest else None,
+                  read_atlas(path, manifest["sha256"]) if "atlas" in manifest else None,
+                  read_voxels(path, manifest["sha256"]) if "voxels" in manifest else None)
+
+
+def _identity(path: Path) -> tuple | None:
+    """What tells one bundle from another that takes its name; None if there is none. File systems give the number of a folder that
+    is gone to the next one, so the times of the folder and of its manifest count too."""
+    try:
+        stats = path.stat(), (path / MANIFEST).stat()
+        return tuple((found.st_dev, found.st_ino, found.st_mtime_ns, found.st_ctime_ns) for found in stats)
+    except OSError:
+        return None
 
 
 def _located(path) -> Path:
-    path = Path(path).expanduser().resolve()
-    try:
-        recover_swap(path)
-    except OSError as error:
-        raise disk_error(path, error, doing="recover") from error
-    return path
+    """Where the bundle at ``path`` lies: beside it, if a run was killed while it was put in place. Nothing is mended here; the next
+    bake to that place does it."""
+    path = resolved(path)
+    aside = replaced_of(path)
+    return aside if not (path / MANIFEST).exists() and (aside / MANIFEST).is_file() else path
 
 
-def _read_volume(bundle: Path, entry: dict) -> ProbeGrid:
+def _check_file(bundle: Path, manifest: dict, name: str) -> None:
+    file = require_inside(bundle, name)
+    _require_size(file, manifest, name)
+    _require_digest(file, sha256_of_file(file), manifest, name)
+
+
+def _require_size(file: Path, manifest: dict, name: str) -> None:
+    """Before a byte is read: what was put in a file's place may be large."""
+    with open_file(file) as (_, size):
+        expected = manifest.get("bytes", {}).get(name, size)
+    if size != expected:
+        raise BakeError(f"{file} is cut short or damaged, it has {size:,} bytes instead of {expected:,}", RESTORE)
+
+
+def _require_digest(file: Path, found: str, manifest: dict, name: str) -> None:
+    if found != manifest["sha256"][name]:
+        raise BakeError(f"{file} is cut short or damaged, its checksum is not the one in {MANIFEST}", RESTORE)
+
+
+def _require_memory(bundle: Path, manifest: dict) -> None:
+    needed, free = sum(volume_bytes(entry) for entry in manifest["volumes"]), available_bytes()
+    if free is not None and needed > free:
+        raise BakeError(f"{bundle} needs {needed / 2**30:.1f} GiB of memory, and {free / 2**30:.1f} GiB are free",
+                        "close other programs, or bake it with a lower resolution")
+
+
+def _read_volume(bundle: Path, manifest: dict, entry: dict, progress: Progress) -> ProbeGrid:
     resolution, cell = tuple(entry["resolution"]), entry["visibility_size"]
     tiles, visibility_tiles = (flipbook.Tiles(entry[key]["columns"], entry[key]["rows"]) for key in ("tiles", "visibility_tiles"))
 
-    def read(name: str, names: str, unfold, finite: bool = True) -> np.ndarray:
-        planes, _ = read_exr(bundle / name)
-        if set(planes) != set(names):
-            raise BakeError(f"{bundle / name} has channels {', '.join(sorted(planes))} instead of {', '.join(names)}", RESTORE)
-        sheet = np.stack([planes[letter] for letter in names], axis=-1, dtype=np.float32)
-        if finite and not np.isfinite(sheet).all():
-            raise BakeError(f"{bundle / name} holds values that are not finite", RESTORE)
-        try:
-            return unfold(sheet)
-        except ValueError as error:
-            raise BakeError(f"{bundle / name} has the wrong size, {error}", RESTORE) from error
+    def read(key: str, letters: str, low: float = -np.inf, high: float = np.inf, coefficient: int | None = None) -> np.ndarray:
+        """The image ``key`` as (nz, ny, nx, letters), or with cells as (nz, ny, nx, cell, cell, letters)."""
+        progress.check()
+        name, size_in = entry["sh"][coefficient] if key == "sh" else entry[key], resolution
+        shown, side = (visibility_tiles, cell) if key == "visibility" else (tiles, 1)
+        if key == "index":
+            name, size_in, shown = name["file"], tuple(name["resolution"]), flipbook.Tiles(**name["tiles"])
+        file = require_inside(bundle, name)
+        size = shown.rows * size_in[1] * side, shown.columns * size_in[0] * side
+        _require_size(file, manifest, name)
+        data = read_file(file, largest_file(size))
+        _require_digest(file, hashlib.sha256(data).hexdigest(), manifest, name)
+        planes, header = decode_exr(data, file, size)
+        require_image(file, planes, letters, header, image_header(entry, key, coefficient), MANIFEST)
+        sheet = np.stack([planes[letter] for letter in letters], axis=-1, dtype=np.float32)
+        _require_range(file, sheet, low, high, finite=key != "standard_error")
+        if key == "visibility":
+            return flipbook.octahedral_from_sheet(sheet, resolution, cell, shown)
+        return flipbook.from_sheet(sheet, size_in, shown)
 
-    def lattice(sheet: np.ndarray) -> np.ndarray:
-        return flipbook.from_sheet(sheet, resolution, tiles)
-
-    validity = read(entry["validity"], "Y", lattice)[..., 0]
+    validity = read("validity", "Y", 0.0, 1.0)[..., 0]
     offset, error = np.zeros((*validity.shape, 3), np.float32), np.full(validity.shape, np.nan, np.float32)
     if "offset" in entry:
-        offset = read(entry["offset"], "RGB", lattice)
+        offset = read("offset", "RGB")
     if "standard_error" in entry:
-        error = read(entry["standard_error"], "Y", lattice, finite=False)[..., 0]
+        error = read("standard_error", "Y", 0.0)[..., 0]
+    scattered = None
+    if "index" in entry:
+        index = read("index", "RGBA").astype(np.int32)
+        _require_words(require_inside(bundle, entry["index"]["file"]), index, validity)
+        scattered = of_grid(index, entry["world_from_local"], offset, validity)
     return ProbeGrid(
-        volume=ProbeVolume(entry["name"], np.array(entry["world_from_local"], np.float64), resolution, bool(entry.get("fitted"))),
-        sh=np.stack([read(name, "RGB", lattice) for name in entry["sh"]], axis=3),
+        volume=ProbeVolume(entry["name"], np.array(entry["world_from_local"], np.float64), resolution, bool(entry.get("fitted")),
+                           scattered=scattered),
+        sh=np.stack([read("sh", "RGB", coefficient=index) for index in range(len(entry["sh"]))], axis=3),
         validity=validity,
-        visibility=read(entry["visibility"], "RG",
-                        lambda sheet: flipbook.octahedral_from_sheet(sheet, resolution, cell, visibility_tiles)),
+        visibility=read("visibility", "RG", 0.0),
         offset_world=offset,
         standard_error=error,
+        fitted=entry.get("coefficients") == FITTED,
     )
 
 
-def _sha256(path: Path) -> str:
-    with open(path, "rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+def _require_words(file: Path, index: np.ndarray, validity: np.ndarray) -> None:
+    """Raises BakeError unless every node of ``index`` names probes that are there."""
+    probes, shares = named(index)
+    there = np.append(validity.ravel() > 0.0, False)[np.minimum(probes, validity.size)]
+    if np.any((shares > 0) & ~there) or not np.all((shares > 0).any(axis=-1)):
+        raise BakeError(f"{file} is damaged, it names probes that are not there", RESTORE)
+
+
+def _require_range(file: Path, values: np.ndarray, low: float, high: float, finite: bool) -> None:
+    if finite and not np.isfinite(values).all():
+        raise BakeError(f"{file} holds values that are not finite", RESTORE)
+    # Not a number means not known, where that is allowed.
+    if np.any(values < low) or np.any(values > high):
+        raise BakeError(f"{file} holds values that are not from {low:g} to {high:g}", RESTORE)

@@ -8,8 +8,11 @@ Sources: https://openexr.com/en/latest/OpenEXRFileLayout.html; the ZIP transform
 ones, then differences.
 """
 
+import io
 import struct
 import zlib
+from collections.abc import Iterable
+from typing import BinaryIO
 
 import numpy as np
 
@@ -24,6 +27,8 @@ _ZIP = 3
 # OpenEXR's own default.
 _LEVEL = 4
 _SHORT, _LONG = 31, 255
+# What stands before a chunk's bytes: its first scanline and how many bytes they are.
+_CHUNK_HEADER = 8
 
 
 class DamagedFile(ValueError):
@@ -37,65 +42,83 @@ class UnknownLayout(ValueError):
 def encode(channels: dict[str, np.ndarray], attributes: dict[str, str]) -> bytes:
     """A file of ``channels`` (name → (height, width) float16 or float32, all of one size, scanline 0 at the top) and text
     ``attributes``. The same input gives the same bytes."""
-    names = sorted(channels, key=str.encode)
-    planes = [np.asarray(channels[name]) for name in names]
-    height, width = planes[0].shape
-    if any(plane.shape != (height, width) for plane in planes):
-        raise ValueError("channels differ in size")
-    planes = [np.ascontiguousarray(plane, plane.dtype.newbyteorder("<")) for plane in planes]
-
-    lines = np.concatenate([plane.view(np.uint8).reshape(height, -1) for plane in planes], axis=1)
-    packed = [_pack(lines[top:top + _LINES[_ZIP]].reshape(-1)) for top in range(0, height, _LINES[_ZIP])]
-    header = _header({name: _CODES[plane.dtype] for name, plane in zip(names, planes, strict=True)}, width, height, attributes)
-
-    sizes = np.array([8 + len(chunk) for chunk in packed])
-    offsets = len(header) + 8 * len(packed) + np.concatenate(([0], np.cumsum(sizes)[:-1]))
-    parts = [header, offsets.astype("<u8").tobytes()]
-    for index, chunk in enumerate(packed):
-        parts += (struct.pack("<2i", index * _LINES[_ZIP], len(chunk)), chunk)
-    return b"".join(parts)
+    planes = {name: np.asarray(plane) for name, plane in channels.items()}
+    file, size = io.BytesIO(), next(iter(planes.values())).shape
+    encode_strips(file, {name: plane.dtype for name, plane in planes.items()}, size, attributes, [planes])
+    return file.getvalue()
 
 
-def decode(data: bytes) -> tuple[dict[str, np.ndarray], dict[str, str]]:
-    """(name → (height, width) float16 or float32, text attributes) of a file's bytes.
+def encode_strips(file: BinaryIO, types: dict[str, np.dtype], size: tuple[int, int], attributes: dict[str, str],
+                  strips: Iterable[dict[str, np.ndarray]]) -> None:
+    """As ``encode``, into ``file``, of an image of ``size`` (height, width) that comes in ``strips`` from the top, each of any
+    height; ``types`` are those of its channels."""
+    names, (height, width) = sorted(types, key=str.encode), size
+    types = {name: np.dtype(types[name]).newbyteorder("<") for name in names}
+    header = _header({name: _CODES[kind] for name, kind in types.items()}, width, height, attributes)
+    offsets = np.zeros(-(-height // _LINES[_ZIP]), "<u8")
+    file.write(header + offsets.tobytes())
+    left, done = np.zeros((0, width * sum(kind.itemsize for kind in types.values())), np.uint8), 0
+    for strip in strips:
+        planes = [np.ascontiguousarray(strip[name], kind) for name, kind in types.items()]
+        if any(plane.shape != (len(planes[0]), width) for plane in planes):
+            raise ValueError("channels differ in size")
+        lines = np.concatenate([plane.view(np.uint8).reshape(len(plane), -1) for plane in planes], axis=1)
+        lines = np.concatenate([left, lines]) if len(left) else lines
+        whole = len(lines) if done + len(lines) == height else len(lines) // _LINES[_ZIP] * _LINES[_ZIP]
+        for top in range(0, whole, _LINES[_ZIP]):
+            chunk = _pack(lines[top:min(top + _LINES[_ZIP], whole)].reshape(-1))
+            offsets[(done + top) // _LINES[_ZIP]] = file.tell()
+            file.write(struct.pack("<2i", done + top, len(chunk)))
+            file.write(chunk)
+        left, done = lines[whole:], done + whole
+    if done != height:
+        raise ValueError(f"{done + len(left)} lines of {height}")
+    file.seek(len(header))
+    file.write(offsets.tobytes())
 
-    Raises DamagedFile or UnknownLayout; never reads or allocates beyond what the data could hold.
+
+def decode(data: bytes, size: tuple[int, int] | None = None) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    """(name → (height, width) float16 or float32, text attributes) of a file's bytes, of which every one is accounted for.
+
+    Raises DamagedFile or UnknownLayout, before any pixel is unpacked if the image is not of ``size`` (height, width). Never reads
+    or allocates beyond what the data could hold, and no pixel is anything but what the file says.
     """
     try:
-        return _decode(data)
+        return _decode(data, size)
     except (struct.error, IndexError, KeyError, UnicodeDecodeError, zlib.error) as error:
         raise DamagedFile(str(error)) from error
 
 
-def _decode(data: bytes) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+def _decode(data: bytes, size: tuple[int, int] | None) -> tuple[dict[str, np.ndarray], dict[str, str]]:
     magic, version = struct.unpack_from("<4si", data)
     if magic != MAGIC:
         raise DamagedFile("not an EXR file")
     if version & ~_LONG_NAMES != _VERSION:
         raise UnknownLayout(f"version and kind {version:#x}")
-    attributes, at = _read_attributes(data, 8)
+    attributes, table = _read_attributes(data, 8)
     layout = _read_channels(attributes["channels"][1])
     compression = attributes["compression"][1][0]
     if compression not in _LINES:
         raise UnknownLayout(f"compression {compression}")
-
     left, top, right, bottom = struct.unpack("<4i", attributes["dataWindow"][1])
-    width, height = right - left + 1, bottom - top + 1
-    chunk_lines = _LINES[compression]
+    width, height, chunk_lines = right - left + 1, bottom - top + 1, _LINES[compression]
+    if size is not None and (height, width) != size:
+        raise DamagedFile(f"{width} × {height} pixels instead of {size[1]} × {size[0]}")
     line_bytes = width * sum(dtype.itemsize for _, dtype in layout)
-    chunks = -(-height // chunk_lines)
     # Deflate packs 1032 to 1 at best: a window beyond that is a damaged header, and no reason to ask for its memory.
-    if width < 1 or height < 1 or at + 8 * chunks > len(data) or line_bytes * height > 1032 * len(data):
+    if width < 1 or height < 1 or line_bytes * height > 1032 * len(data):
         raise DamagedFile("the data window does not fit the file")
 
+    chunks = _find_chunks(data, table, -(-height // chunk_lines))
     lines = np.empty((height, line_bytes), np.uint8)
-    for offset in struct.unpack_from(f"<{chunks}Q", data, at):
-        y, size = struct.unpack("<2i", data[offset:offset + 8])
-        begin, first = offset + 8, y - top
-        if not 0 <= first < height or first % chunk_lines or not 0 <= size <= len(data) - begin:
-            raise DamagedFile("a chunk lies outside the file")
+    unread = set(range(0, height, chunk_lines))
+    for begin, end in chunks:
+        first = struct.unpack_from("<i", data, begin)[0] - top
+        if first not in unread:
+            raise DamagedFile("a chunk lies outside the image or is there twice")
+        unread.remove(first)
         rows = lines[first:first + chunk_lines]
-        rows[...] = _unpack(data[begin:begin + size], rows.size).reshape(rows.shape)
+        rows[...] = _unpack(data[begin + _CHUNK_HEADER:end], rows.size).reshape(rows.shape)
 
     planes, column = {}, 0
     for name, dtype in layout:
@@ -103,6 +126,27 @@ def _decode(data: bytes) -> tuple[dict[str, np.ndarray], dict[str, str]]:
         planes[name] = np.ascontiguousarray(lines[:, column:end]).view(dtype)
         column = end
     return planes, {name: value.decode() for name, (kind, value) in attributes.items() if kind == "string"}
+
+
+def _find_chunks(data: bytes, table: int, count: int) -> list[tuple[int, int]]:
+    """(begin, end) of each of ``count`` chunks, whose offsets begin at ``table``: all that follows the table, without a gap or a
+    byte in two of them."""
+    begin = table + 8 * count
+    if begin > len(data):
+        raise DamagedFile("the table of chunks is cut short")
+    offsets = struct.unpack_from(f"<{count}Q", data, table)
+    chunks = []
+    for offset in sorted(offsets):
+        if offset != begin:
+            raise DamagedFile("a chunk does not begin where the one before it ends")
+        size, = struct.unpack_from("<i", data, offset + 4)
+        begin = offset + _CHUNK_HEADER + size
+        if size < 0 or begin > len(data):
+            raise DamagedFile("a chunk is cut short")
+        chunks.append((offset, begin))
+    if begin != len(data):
+        raise DamagedFile("something follows the last chunk")
+    return chunks
 
 
 def _pack(raw: np.ndarray) -> bytes:
@@ -123,8 +167,9 @@ def _unpack(packed: bytes, size: int) -> np.ndarray:
         return np.frombuffer(packed, np.uint8)
     inflater = zlib.decompressobj()
     difference = np.frombuffer(inflater.decompress(packed, size), np.uint8).copy()
-    if difference.size != size or not inflater.eof:
-        raise DamagedFile("a chunk is cut short")
+    # A stream that would go on is refused here, before it is unpacked any further.
+    if difference.size != size or not inflater.eof or inflater.unused_data:
+        raise DamagedFile("a chunk holds more or less than its lines")
     difference[1:] += 128
     split = np.cumsum(difference, dtype=np.uint8)
     raw, half = np.empty(size, np.uint8), -(-size // 2)
@@ -164,6 +209,8 @@ def _read_attributes(data: bytes, at: int) -> tuple[dict[str, tuple[str, bytes]]
         at += 4
         if size < 0 or at + size > len(data):
             raise DamagedFile("an attribute is cut short")
+        if name in attributes:
+            raise DamagedFile("an attribute is there twice")
         attributes[name] = (kind, data[at:at + size])
         at += size
     return attributes, at + 1
@@ -171,15 +218,19 @@ def _read_attributes(data: bytes, at: int) -> tuple[dict[str, tuple[str, bytes]]
 
 def _read_channels(value: bytes) -> list[tuple[str, np.dtype]]:
     """(name, type) in the order of the file."""
-    found, at = [], 0
+    found, at = {}, 0
     while value[at]:
         name, at = _read_name(value, at)
         code, *sampling = struct.unpack_from("<i4x2i", value, at)
         at += 16
         if code not in _TYPES or sampling != [1, 1]:
             raise UnknownLayout(f"channel {name} holds other than whole pixels of half or float")
-        found.append((name, _TYPES[code]))
-    return found
+        if name in found:
+            raise DamagedFile("a channel is there twice")
+        found[name] = _TYPES[code]
+    if at + 1 != len(value) or not found:
+        raise DamagedFile("the list of channels does not end where it should")
+    return list(found.items())
 
 
 def _name(text: str) -> bytes:

@@ -1,4 +1,4 @@
-"""Volumes as flat sheets and back (FORMATS.md): slice z is the tile at column z mod columns, row z div columns.
+"""Volumes as flat sheets and back (docs/formats.md): slice z is the tile at column z mod columns, row z div columns.
 
 Inside a tile x grows to the right and y down the stored scanlines (scanline 0 is the top of the file). An octahedral sheet
 is the same with every probe's pixel replaced by its T×T map, row 0 of the map on top.
@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import BakeError
+from ..techniques.base import MAX_TEXTURE_SIDE
 
-# The largest image side that the engines and GPUs we write for all accept.
-MAX_SIDE = 16384
+MAX_SIDE = MAX_TEXTURE_SIDE
 
 
 class Tiles(NamedTuple):

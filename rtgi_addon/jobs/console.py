@@ -3,6 +3,8 @@
 import shutil
 import time
 
+from ..words import one_line
+
 
 class ConsoleProgress:
     """The ``report`` of a ``Progress``, writing to the text stream ``stream``.
@@ -25,7 +27,7 @@ class ConsoleProgress:
             return
         self._last = now
         left = "" if seconds_left is None or fraction >= 1.0 else f", {duration(seconds_left)} left"
-        self._write(f"rtgi: {100.0 * fraction:3.0f} % {label}{left}")
+        self._write(one_line(f"rtgi: {100.0 * fraction:3.0f} % {label}{left}"))
 
     def close(self) -> None:
         """Take the updating line away, so that the next output starts on a clean line."""

@@ -1,5 +1,6 @@
 """From a Scene to a plan, and from a plan to a finished bundle that says how good the plan was."""
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
@@ -9,29 +10,39 @@ from ..evaluate.metrics import Figure
 from ..evaluate.plan import Plan, Target, make_plan
 from ..evaluate.plan.look import Motion
 from ..evaluate.plan.reasons import percent, size
-from ..evaluate.plan.sample import draw_sample
-from ..evaluate.plan.search import CONFIDENCE, upper
+from ..evaluate.plan.sample import NothingToSee, draw_sample
+from ..evaluate.plan.tries import CONFIDENCE, upper
 from ..evaluate.references import PathReference
 from ..exchange.bundle import check_target
 from ..exchange.plain import plain
 from ..progress import Progress
-from ..scene import Scene
+from ..scene import ProbeVolume, Scene
 from ..scene.checks import check_scene, require
+from ..storage.workplace import workplace
 from ..techniques import Field
-from ..techniques.probes.field import ProbeField
+from ..techniques.lattice.coverage import require_usable
+from ..techniques.lattice.field import ProbeField
 from ..transport.context import LightContext
-from ..transport.ray_counter import count_rays
-from .bake import bake_scene, select_volumes
+from ..transport.rays.ray_counter import count_rays
+from ..words import as_lines
+from .bake import bake_scene
+from .plan_answer import by_rays, cost, error, spoken, what
+from .plan_beside import beside
+from .ready import select_volumes
 from .report import BakeSummary
 
 # Shares of the progress of a planned bake: the plan until the first, the bake until the second, then the check.
 PLANNED_AT, BAKED_AT = 0.3, 0.9
 # Surface points that a plan is checked on, which it has not seen; noise of their reference, and the most paths of all of them.
 CHECK_POINTS, CHECK_NOISE, CHECK_PATHS = 256, 0.05, 1 << 18
+# The share of other draws of points that the interval of the check is meant to cover.
+CHECKED = 0.95
 # What makes the receivers of the check others than those of the plan.
 HELD_BACK = 0x68656C64
+# What is baked where nobody names a technique, and the technique whose probes can be fitted to surfaces.
+USUAL = FITTING = "probes"
 # Stages that are not part of what a plan predicts the seconds of.
-_OTHER_STAGES = frozenset({"plan", "extract", "check", "write", "verify", "picture"})
+_OTHER_STAGES = frozenset({"plan", "extract", "check", "write", "verify", "picture", "fit", "spheres"})
 
 
 @dataclass(frozen=True)
@@ -52,11 +63,13 @@ class PlanReport:
 @dataclass(frozen=True)
 class Check:
     """How good a plan was: predicted against found. ``error`` is measured at ``points`` surface points that the plan did not see,
-    by the path tracer with relative ``noise``, which is taken out. ``seconds`` and ``rays`` are those of the bake without plan,
-    checks and files."""
+    by the path tracer with relative ``noise``, which is taken out; as many other points would say from ``low`` to ``high``
+    (95 % of such draws: numerics/heavy_tail.py). ``seconds`` and ``rays`` are those of the bake without plan, checks and files."""
 
     predicted: Figure
     error: Figure
+    low: float
+    high: float
     noise: float
     points: int
     predicted_seconds: float
@@ -67,15 +80,16 @@ class Check:
 
     @property
     def within(self) -> bool:
-        """Whether the error is below the target, or above it by less than one-sided CONFIDENCE takes."""
-        return 2.0 * self.error.value - upper(self.error) <= self.target
+        """Whether the error is below the target, or above it by less than another draw of points may be below this one."""
+        return self.low <= self.target
 
     def to_text(self) -> str:
         """Two lines for a person."""
         verdict = "" if self.error.value <= self.target else \
             f", above {percent(self.target)} by less than the check can tell" if self.within else f", above {percent(self.target)}"
-        return (f"  error    {percent(self.predicted.value)} predicted, {percent(self.error.value)} +- "
-                f"{percent(self.error.standard_error)} found at {self.points} surface points that the plan did not see{verdict}\n"
+        return (f"  error    {percent(self.predicted.value)} predicted, {percent(self.error.value)} found at "
+                f"{self.points} surface points that the plan did not see ({percent(self.low)} to {percent(self.high)} at as many "
+                f"others){verdict}\n"
                 f"  time     {self.predicted_seconds:.2g} s predicted, {self.seconds:.2g} s taken; {self.predicted_rays / 1e6:.2g} "
                 f"million rays predicted, {self.rays / 1e6:.2g} million traced")
 
@@ -112,34 +126,66 @@ def plan_scene(scene: Scene, target: Target, *, seed: int = 0, threads: int | No
     progress.stage("plan")
     scene = replace(scene, volumes=select_volumes(scene.volumes, volume, {}))
     require(check_scene(scene))
-    return PlanReport(make_plan(scene, target, seed=seed, threads=threads, motion=motion, others=others, progress=progress))
+    require_usable(scene, threads)
+    plan = make_plan(scene, target, seed=seed, threads=threads, motion=motion, others=others, progress=progress)
+    return PlanReport(replace(plan, reasons=(*plan.reasons, *beside(scene, plan.probes))))
 
 
 def bake_planned(scene: Scene, target: Target, out, *, seed: int = 0, threads: int | None = None, volume=None,
-                 motion: Motion | None = None, check: bool = True, direct: bool = False, progress: Progress | None = None,
-                 **options) -> PlannedBake:
-    """Plan, bake into ``out`` as planned, and ``check`` the result at receivers that were held back.
+                 motion: Motion | None = None, check: bool = True, direct: bool = False, fit: bool = False,
+                 keep: Callable[[Field], None] | None = None, progress: Progress | None = None, **options) -> PlannedBake:
+    """Plan, bake into ``out`` as planned, and ``check`` the result at receivers that were held back. With ``fit`` probes that are
+    planned as they are measured are then fitted to surfaces, so that the plan's error is what they had without.
 
-    ``options`` go to bake_scene. The plan is in the bundle's notes. Raises as bake_scene does.
+    ``keep`` and ``options`` go to bake_scene. The plan is in the bundle's notes. Raises as bake_scene does.
     """
     progress = progress or Progress()
     if direct and check:
         raise UsageError("a check holds the bake to indirect light, and --direct adds the lamps'", "add --no-check")
-    check_target(out)
-    plan = plan_scene(scene, target, seed=seed, threads=threads, volume=volume, motion=motion, others=False,
-                      progress=progress.span(0.0, PLANNED_AT)).plan
-    planned = plan.applied(scene)
+    other = next((volume for volume in select_volumes(scene.volumes, volume, {}) if not volume.captures_all), None)
+    if check and other is not None:
+        raise UsageError(f"a check holds the bake to all light as it is, and volume {other.name} captures other light",
+                         "add --no-check")
     kept: list[Field] = []
-    settings = {**plan.settings, **({"direct": True} if direct else {})}
-    with count_rays() as counter:
-        summary = bake_scene(planned, plan.technique, settings, out, seed=seed, threads=threads, volume=volume, keep=kept.append,
-                             progress=progress.span(PLANNED_AT, BAKED_AT if check else 1.0), **options)
+    # Nobody else takes the place while the plan is made.
+    with workplace(check_target(out, inputs=scene.files), "bake") as place:
+        plan = plan_scene(scene, target, seed=seed, threads=threads, volume=volume, motion=motion, others=False,
+                          progress=progress.span(0.0, PLANNED_AT)).plan
+        settings = {**plan.settings, **({"direct": True} if direct else {})}
+        if fit and plan.technique != FITTING:
+            raise UsageError(f"the plan is {plan.technique}, which has nothing to fit", "leave out --fit")
+        if fit:
+            settings["fit"] = True
+        with count_rays() as counter:
+            names = None if volume is None else [one.name for one in plan.volumes]
+            summary = bake_scene(plan.applied(scene), plan.technique, settings, place, seed=seed, threads=threads, volume=names,
+                                 keep=kept.append, begun=plan.found.reading.pilot.begun,
+                                 progress=progress.span(PLANNED_AT, BAKED_AT if check else 1.0), **options)
+    if keep is not None:
+        keep(kept[0])
     found = None
     if check:
         progress.stage("verify")
-        found = check_plan(plan, scene, kept[0], summary.seconds, counter.rays, threads, progress.span(BAKED_AT, 1.0))
+        # Of the rays, as of the seconds, those of a fit and of sphere probes were not predicted.
+        rays = counter.rays - sum(made["rays"] for made in kept[0].stats.get("fits", ())) - summary.stats.get("spheres_traced", 0)
+        found = check_plan(plan, scene, kept[0], summary.seconds, rays, threads, progress.span(BAKED_AT, 1.0))
         summary = replace(summary, seconds=progress.finish())
     return PlannedBake(plan, summary, found)
+
+
+def bake_fitted(scene: Scene, out, *, progress: Progress | None = None, **options) -> PlannedBake | BakeSummary:
+    """Bake ``scene``, whose volume was fitted because it has none, into ``out`` as a plan for the usual target says, without a
+    check: how dense probes have to stand is not to be seen from the size of a scene. Probes that no surface reads stay, for what
+    may move there. Where no surface is seen that a plan could go by, the fitted lattice is baked by defaults.
+
+    ``options`` go to bake_planned. Raises as that does.
+    """
+    progress = progress or Progress()
+    try:
+        return bake_planned(scene, Target(keep_air=True), out, check=False, progress=progress, **options)
+    except NothingToSee:
+        options = {name: value for name, value in options.items() if name != "motion"}
+        return bake_scene(scene, USUAL, {}, out, progress=progress, **options)
 
 
 def check_plan(plan: Plan, scene: Scene, field: Field, seconds: dict[str, float], rays: int, threads: int | None,
@@ -151,24 +197,22 @@ def check_plan(plan: Plan, scene: Scene, field: Field, seconds: dict[str, float]
     context = LightContext(scene, threads)
     sample = draw_sample(context, files, CHECK_POINTS, plan.seed ^ HELD_BACK)
     truth = PathReference(context, CHECK_NOISE, CHECK_PATHS, plan.seed + 1).irradiance(sample.receivers, progress)
-    shipped = field if isinstance(field, ProbeField) else ProbeField(field.grids(), includes_direct=field.includes_direct)
-    error = sample.error(shipped.irradiance(sample.receivers.points, sample.receivers.normals), truth)
+    found = ProbeField.of(field).irradiance(sample.receivers.points, sample.receivers.normals)
+    error, interval = sample.error(found, truth), sample.interval(found, truth, CHECKED)
     chosen, taken = plan.chosen, sum(value for stage, value in seconds.items() if stage not in _OTHER_STAGES)
-    return Check(chosen.error, error, truth.noise, sample.points, chosen.price.seconds, taken, chosen.price.rays, rays,
+    return Check(chosen.error, error, *interval, truth.noise, sample.points, chosen.price.seconds, taken, chosen.price.rays, rays,
                  plan.target.error)
 
 
 def plan_text(plan: Plan, table: bool = True) -> str:
     """The plan as lines for a person, with or without the table of what else there is."""
-    settings = ", ".join(f"{name} {value:g}" for name, value in plan.settings.items())
-    lines = [f"Planned: {plan.technique} with {settings} on {', '.join(f'{v.name} {size([v.resolution])}' for v in plan.volumes)}"
-             + ("" if plan.met else f" ({percent(plan.target.error)} is out of reach)"),
-             *(f"  {line}" for line in plan.reasons)]
+    lines = [f"Planned: {what(plan)}", f"  error    {error(plan)}", f"  cost     {cost(plan)}", "",
+             *(f"  {line}" for line in (*plan.reasons, *filter(None, [by_rays(plan)])))]
     if table:
         lines += ["", *_table(plan)]
     price = plan.chosen.price
-    return "\n".join([*lines, f"  The plan took {plan.seconds:.2g} s and {plan.rays / 1e6:.2g} million rays; the bake is thought "
-                              f"to take {price.seconds:.2g} s and {price.rays / 1e6:.2g} million."])
+    return as_lines([*lines, f"  The plan took {spoken(plan.seconds)} and {plan.rays / 1e6:.2g} million rays; the bake is thought "
+                              f"to take {spoken(price.seconds)} and {price.rays / 1e6:.2g} million."])
 
 
 def plan_json(plan: Plan) -> dict:
@@ -176,12 +220,27 @@ def plan_json(plan: Plan) -> dict:
     return plain({
         "technique": plan.technique, "settings": plan.settings, "met": plan.met, "target": asdict(plan.target), "seed": plan.seed,
         "volumes": [{"name": volume.name, "resolution": list(volume.resolution),
-                     "kept": None if volume.wanted is None else int(np.sum(volume.wanted))} for volume in plan.volumes],
+                     "kept": None if volume.wanted is None else int(np.sum(volume.wanted)), "within": volume.planned or None,
+                     "world_from_local": volume.world_from_local, "dropped": _dropped(volume)} for volume in plan.volumes],
         "probes": plan.probes, "kept": plan.kept, "confidence": CONFIDENCE, "convergence_rate": plan.rate,
-        "reasons": list(plan.reasons), "scene": asdict(plan.look), "options": [_option_json(option) for option in plan.options],
+        "reasons": list(plan.reasons), "picture": _picture_json(plan), "scene": asdict(plan.look),
+        "options": [_option_json(option) for option in plan.options],
         "measured": [{"resolutions": [list(resolution) for resolution in reading.resolutions],
                       "error": reading.error(plan.found.order)._asdict()} for reading in plan.found.climb],
         "plan_seconds": plan.seconds, "plan_rays": plan.rays})
+
+
+def _picture_json(plan: Plan) -> dict | None:
+    look, asked = plan.picture, plan.target.error
+    return None if look is None else {**asdict(look), "samples": look.samples(asked), "seconds": look.seconds(asked)}
+
+
+def _dropped(volume: ProbeVolume) -> list[list[int]]:
+    """Ranges [first, last] of the flat indices, x fastest, of the probes of ``volume`` that get no rays."""
+    if volume.wanted is None:
+        return []
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], ~np.asarray(volume.wanted, bool).ravel(), [False]])))
+    return [[int(first), int(last) - 1] for first, last in edges.reshape(-1, 2)]
 
 
 def _option_json(option) -> dict:
@@ -201,7 +260,7 @@ def _table(plan: Plan) -> list[str]:
             rows.append((*start, "-", "-", "-", "-", option.why_not))
             continue
         price = option.price
-        rows.append((*start, percent(option.error.value), percent(upper(option.error)), f"{price.seconds:.2g} s",
+        rows.append((*start, percent(option.error.value), percent(upper(option.error)), spoken(price.seconds),
                      f"{price.bytes / 2**20:,.0f} MiB", "meets it" if option.meets else ""))
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     lines = ["  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]

@@ -1,4 +1,4 @@
-"""Cell-centred probe lattices: Blender's Light Probe Volume (PHYSICS.md §1).
+"""Cell-centred probe lattices: Blender's Light Probe Volume (docs/physics.md §1).
 
 The volume is the box local [−1, 1]³ under ``world_from_local``; with resolution N along an axis, sample i lies at local
 (2i + 1)/N − 1, as in EEVEE. Lattice coordinates count in samples: sample i is at i, the box reaches from −½ to N − ½.
@@ -7,11 +7,19 @@ Arrays over a lattice are indexed [z, y, x]; its flat index is (z·ny + y)·nx +
 
 import numpy as np
 
+# Corners of the box [−1, 1]³ that probe volumes are in their own space.
+UNIT_BOX = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float64)
+
 
 def transform_points(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:
     """``points`` (…, 3) under the affine ``matrix`` (4, 4): float64 (…, 3)."""
     matrix = np.asarray(matrix, np.float64)
     return np.asarray(points, np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def box_corners(world_from_local: np.ndarray) -> np.ndarray:
+    """Corners (8, 3) float64 of a volume in the world."""
+    return transform_points(world_from_local, UNIT_BOX)
 
 
 def local_from_world(world_from_local: np.ndarray, points_world: np.ndarray) -> np.ndarray:
@@ -74,3 +82,10 @@ def trilinear(points_lattice: np.ndarray, resolution) -> tuple[np.ndarray, np.nd
     indices = offsets[:, 0, bits[0]] + offsets[:, 1, bits[1]] + offsets[:, 2, bits[2]]
     weights = shares[:, 0, bits[0]] * shares[:, 1, bits[1]] * shares[:, 2, bits[2]]
     return indices, weights
+
+
+def box_distance(world_from_local: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """(n,) float64: from ``points`` (n, 3) to the point of the box local [−1, 1]³ with the nearest local coordinates [m]; 0
+    inside."""
+    nearest = transform_points(world_from_local, np.clip(local_from_world(world_from_local, points), -1.0, 1.0))
+    return np.linalg.norm(nearest - points, axis=-1)

@@ -9,6 +9,8 @@ tile's border: Z. Majercik et al., "Dynamic Diffuse Global Illumination with Ray
 
 import numpy as np
 
+from .. import kernels
+
 
 def encode(directions: np.ndarray) -> np.ndarray:
     """Square coordinates (n, 2) in [−1, 1] of ``directions`` (n, 3), which need not be of unit length."""
@@ -27,6 +29,10 @@ def decode(xy: np.ndarray) -> np.ndarray:
 
 def texel_index(directions: np.ndarray, resolution: int) -> np.ndarray:
     """Flat texel index (n,) int64 = row·resolution + column of each of ``directions`` (n, 3)."""
+    if kernels.is_available() and directions.dtype == np.float32 and directions.ndim == 2:
+        cells = np.empty(len(directions), np.int32)
+        kernels.call("octahedral_cells", len(directions), np.ascontiguousarray(directions), resolution, cells)
+        return cells.astype(np.int64)
     cell = np.floor((encode(directions) + 1.0) * (0.5 * resolution)).astype(np.int64)
     np.clip(cell, 0, resolution - 1, out=cell)
     return cell[..., 1] * resolution + cell[..., 0]
@@ -69,7 +75,10 @@ def add_border(tiles: np.ndarray) -> np.ndarray:
     last = resolution - 1
     outside_row, outside_column = (row < 0) | (row > last), (column < 0) | (column > last)
     row, column = np.clip(row, 0, last), np.clip(column, 0, last)
-    return tiles[..., np.where(outside_column, last - row, row), np.where(outside_row, last - column, column), :]
+    texel = np.where(outside_column, last - row, row) * resolution + np.where(outside_row, last - column, column)
+    # As one index of texels this takes half the time of two.
+    flat = np.take(tiles.reshape(*tiles.shape[:-3], resolution**2, tiles.shape[-1]), texel.ravel(), axis=-2)
+    return flat.reshape(*tiles.shape[:-3], resolution + 2, resolution + 2, tiles.shape[-1])
 
 
 def bilinear(directions: np.ndarray, resolution: int) -> tuple[np.ndarray, np.ndarray]:

@@ -14,6 +14,8 @@ from functools import cache
 
 import numpy as np
 
+from .. import kernels
+
 # Joe and Kuo's set D6: (degree s, inner coefficients a of the primitive polynomial, initial m_1 … m_s) from dimension 2 on.
 _JOE_KUO_D6 = (
     (1, 0, (1,)),
@@ -36,7 +38,7 @@ SOBOL_DIMENSIONS = len(_JOE_KUO_D6) + 1
 
 # Powers −1 and −2 of the plastic number (the real root of x³ = x + 1) as 64-bit fractions: Roberts' R2.
 _R2_STEP = (np.uint64(0xC13FA9A902A6328F), np.uint64(0x91E10DA5C79E7B1D))
-_GOLDEN_FRACTION = (np.sqrt(5.0) - 1.0) / 2.0
+GOLDEN_FRACTION = (np.sqrt(5.0) - 1.0) / 2.0
 
 
 def hash_u32(*values) -> np.ndarray:
@@ -72,6 +74,12 @@ def sobol_owen_at(index: np.ndarray, dims: int, seed, shuffle: bool = False, fir
     index, seed = np.asarray(index).astype(np.uint32), np.asarray(seed).astype(np.uint32)
     if shuffle:
         index = _reverse_bits(_owen_of_reversed(_reverse_bits(index), hash_u32(seed, dims)))
+    if kernels.is_available():
+        shape = np.broadcast_shapes(index.shape, seed.shape)
+        index, seed = (np.ascontiguousarray(np.broadcast_to(part, shape)).reshape(-1) for part in (index, seed))
+        points = np.empty((*shape, dims - first), np.float32)
+        kernels.call("sobol_owen", _sobol_tables(), SOBOL_DIMENSIONS, index.size, index, seed, first, dims, points)
+        return points
     octets = [(index >> np.uint32(shift)) & np.uint32(255) for shift in (0, 8, 16, 24)]
     points = np.empty((*np.broadcast_shapes(index.shape, seed.shape), dims - first), np.float32)
     tables = _sobol_tables()
@@ -79,7 +87,7 @@ def sobol_owen_at(index: np.ndarray, dims: int, seed, shuffle: bool = False, fir
         reversed_bits = tables[d, 0][octets[0]]
         for table, octet in zip(tables[d, 1:], octets[1:], strict=True):
             reversed_bits = reversed_bits ^ table[octet]
-        points[..., d - first] = _unit_interval(_reverse_bits(_owen_of_reversed(reversed_bits, hash_u32(seed, d + 1))))
+        points[..., d - first] = unit_interval(_reverse_bits(_owen_of_reversed(reversed_bits, hash_u32(seed, d + 1))))
     return points
 
 
@@ -89,7 +97,7 @@ def r2(n: int, seed, start: int = 0) -> np.ndarray:
     points = np.empty((n, 2), np.float32)
     for d, step in enumerate(_R2_STEP):
         shift = np.uint64(int(hash_u32(seed, d)) << 32)
-        points[:, d] = _unit_interval(((index * step + shift) >> np.uint64(32)).astype(np.uint32))
+        points[:, d] = unit_interval(((index * step + shift) >> np.uint64(32)).astype(np.uint32))
     return points
 
 
@@ -97,7 +105,7 @@ def fibonacci_sphere(n: int) -> np.ndarray:
     """n near-uniform directions (n, 3) float32 on the spherical Fibonacci lattice, offset ½ (one ring per point, none at a
     pole); each stands for the solid angle 4π/n."""
     index = np.arange(n, dtype=np.float64)
-    azimuth = 2.0 * np.pi * np.mod(index * _GOLDEN_FRACTION, 1.0)
+    azimuth = 2.0 * np.pi * np.mod(index * GOLDEN_FRACTION, 1.0)
     z = 1.0 - (2.0 * index + 1.0) / n
     ring = np.sqrt(np.maximum(0.0, 1.0 - z * z))
     return np.stack([ring * np.cos(azimuth), ring * np.sin(azimuth), z], axis=-1).astype(np.float32)
@@ -145,6 +153,12 @@ def frame(normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return tangent.astype(normals.dtype, copy=False), bitangent.astype(normals.dtype, copy=False)
 
 
+def about(normals: np.ndarray, local: np.ndarray) -> np.ndarray:
+    """Directions ``local`` (n, 3) about +z turned to lie about unit ``normals`` (n, 3); not normalized again."""
+    tangent, bitangent = frame(normals)
+    return tangent * local[:, :1] + bitangent * local[:, 1:2] + normals * local[:, 2:]
+
+
 def random_rotations(n: int, rng: np.random.Generator) -> np.ndarray:
     """n rotation matrices (n, 3, 3) float64, uniform over SO(3) (Shoemake 1992: a uniform unit quaternion)."""
     u = rng.random((n, 3))
@@ -190,7 +204,12 @@ def _owen_of_reversed(x: np.ndarray, seed: np.ndarray) -> np.ndarray:
     return x
 
 
-def _unit_interval(x: np.ndarray) -> np.ndarray:
+def wrapped(numbers: np.ndarray) -> np.ndarray:
+    """``numbers`` on the torus [0, 1): after a shift (Cranley and Patterson 1976) the part behind the point."""
+    return numbers - np.floor(numbers)
+
+
+def unit_interval(x: np.ndarray) -> np.ndarray:
     """float32 in [0, 1) from the top 24 bits: the largest value stays below 1 and no elementary interval is left by rounding."""
     return (x >> np.uint32(8)).astype(np.float32) * np.float32(2.0**-24)
 
@@ -215,4 +234,4 @@ def _sobol_tables() -> np.ndarray:
     for bit in range(8):
         chosen = ((octet >> np.uint32(bit)) & np.uint32(1)).astype(bool)
         tables ^= np.where(chosen, directions.reshape(SOBOL_DIMENSIONS, 4, 8)[:, :, bit, None], np.uint32(0))
-    return _reverse_bits(tables)
+    return np.ascontiguousarray(_reverse_bits(tables))

@@ -1,4 +1,4 @@
-"""Real spherical harmonics of any order (PHYSICS.md §1): orthonormal, without the Condon-Shortley sign.
+"""Real spherical harmonics of any order (docs/physics.md §1): orthonormal, without the Condon-Shortley sign.
 
 Coefficient l² + l + m belongs to Y_lm; the first nine basis functions are 1, y, z, x, xy, yz, 3z² − 1, xz, x² − y² times
 .282095, .488603, 1.092548, .315392 and .546274. A probe stores the projection of incident radiance; convolving it with the
@@ -13,6 +13,8 @@ from functools import cache
 from math import factorial, pi, sqrt
 
 import numpy as np
+
+from .. import kernels
 
 _PROJECT_CHUNK = 1 << 16
 
@@ -47,6 +49,15 @@ def evaluate(directions: np.ndarray, order: int) -> np.ndarray:
     basis = np.empty((coefficient_count(order), *directions.shape[:-1]), directions.dtype)
     (_closed_forms if order <= 2 else _recurrence)(x, y, z, order, basis)
     return np.moveaxis(basis, 0, -1)
+
+
+def evaluate_rows(directions: np.ndarray, order: int) -> np.ndarray:
+    """As ``evaluate`` for ``directions`` (n, 3), direction by direction in memory."""
+    if order <= 2 and directions.dtype == np.float32 and kernels.is_available():
+        basis = np.empty((len(directions), coefficient_count(order)), np.float32)
+        kernels.call("sh_basis", len(directions), np.ascontiguousarray(directions), order, basis)
+        return basis
+    return np.ascontiguousarray(evaluate(directions, order))
 
 
 def project(directions: np.ndarray, values: np.ndarray, solid_angles, order: int) -> np.ndarray:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import BakeError
+from ..techniques.base import MAX_TEXTURE_SIDE
 
 
 @dataclass(frozen=True)
@@ -16,7 +17,7 @@ class Atlas:
     rows: int
 
     @staticmethod
-    def of(resolution, limit: int = 16384) -> "Atlas":
+    def of(resolution, limit: int = MAX_TEXTURE_SIDE) -> "Atlas":
         """The squarest layout. Raises BakeError if a side passes ``limit`` texels."""
         nx, ny, nz = (int(count) for count in resolution)
         columns = min(max(round(float(np.sqrt(nz * ny / nx))), 1), nz)

@@ -27,10 +27,10 @@ def build(program: Program) -> gpu.types.GPUShader:
         info.uniform_buf(unit, struct.name, name)
     for unit, name in enumerate(program.samplers):
         info.sampler(unit, "FLOAT_2D", name)
+    for unit, image in enumerate(program.images):
+        info.image(unit, image.format, image.kind, image.name, qualifiers=_QUALIFIERS[image.access])
     if program.is_compute:
         info.local_group_size(*program.local_size)
-        for unit, image in enumerate(program.images):
-            info.image(unit, image.format, "FLOAT_2D", image.name, qualifiers=_QUALIFIERS[image.access])
         info.compute_source(source(program.name, "comp"))
         return gpu.shader.create_from_info(info)
     for slot, (kind, name) in enumerate(program.inputs):

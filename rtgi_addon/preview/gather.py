@@ -9,19 +9,21 @@ import gpu
 import numpy as np
 
 from ..techniques.lpv.cascades import shares
-from ..techniques.lpv.gather import BEHIND_CELLS, FACE_AHEAD, FACE_TOTAL, SURFACE_CELLS
+from ..techniques.lpv.gather import SURFACE_CELLS, irradiance_factors
 from ..techniques.lpv.grid import LpvGrid
 from ..techniques.rsm.gather import GatherMap, Pattern, rotations
-from ..transport.virtual_lights import VirtualLights
+from ..techniques.vpl.virtual_lights import VirtualLights
 from .device import dispatch
 from .light_volume import atlas_of, upload_light
-from .packing import FOLD_WIDTH, LIGHTS_PER_TEXEL, fold, light_rows, map_texels, unfold, visibility_bits
+from .packing import FOLD_WIDTH, LIGHTS_PER_TEXEL, fold, light_rows, map_texels, unfold, visibility_bits, wall_texels
 from .program import Program
 from .programs import LPV_GATHER, RSM_GATHER, VPL_GATHER
 from .textures import download, empty, upload
 
 # Pairs of a receiver and what it sums over in one dispatch: drivers end what takes seconds.
 _PAIRS_PER_DISPATCH = 1 << 27
+# Cells that a receiver reads of a light propagation volume: eight before its surface, and eight further off for damping.
+_LPV_STEPS = 16
 # Lights and texels of visibility that one image of receivers is gathered from at once.
 _LIGHTS_AT_ONCE, _VISIBILITY_TEXELS = 1 << 16, 1 << 24
 
@@ -62,22 +64,21 @@ def rsm_gather(maps: tuple[GatherMap, ...], points: np.ndarray, normals: np.ndar
 
 
 def lpv_gather(grids: tuple[LpvGrid, ...], volumes: tuple[np.ndarray, ...], points: np.ndarray, normals: np.ndarray,
-               dampening: bool = True) -> np.ndarray:
+               dampening: bool = False, faces: tuple[np.ndarray | None, ...] | None = None) -> np.ndarray:
     """See techniques.lpv.gather.gather."""
     points = np.asarray(points, np.float64)
     total, share = _Sum(len(points)), shares(grids, points)
-    for grid, volume, weight in zip(grids, volumes, share.T, strict=True):
+    for grid, volume, weight, of_grid in zip(grids, volumes, share.T, faces or (None,) * len(grids), strict=True):
         if not weight.any():
             continue
         atlas = atlas_of(grid.resolution)
         receivers = np.concatenate([grid.cells_of(points), weight[:, None], normals], axis=1)
         light = dict(zip(("light_red", "light_green", "light_blue"), upload_light(volume, atlas), strict=True))
-        # Factors of coefficients 0 and 1 to 3: SH constants, the faces' solid angles, over the area of a face.
-        total.add(LPV_GATHER, 16, {"resolution": grid.resolution, "columns": atlas.columns, "dampening": int(dampening),
-                                   "total": np.sqrt(0.25 / np.pi) * FACE_TOTAL / grid.cell**2,
-                                   "along": np.sqrt(0.75 / np.pi) * FACE_AHEAD / grid.cell**2,
-                                   "surface_cells": SURFACE_CELLS, "behind": BEHIND_CELLS},
-                  {"receivers": upload(fold(receivers)), **light})
+        of_flux, of_vector = irradiance_factors(grid)
+        total.add(LPV_GATHER, _LPV_STEPS,
+                  {"resolution": grid.resolution, "columns": atlas.columns, "dampening": int(dampening), "total": of_flux,
+                   "along": of_vector, "surface_cells": SURFACE_CELLS},
+                  {"receivers": upload(fold(receivers)), **light, "walls": upload(wall_texels(atlas, of_grid))})
     return total.result()
 
 
@@ -99,9 +100,9 @@ def _vpl_block(lights: VirtualLights, rows: np.ndarray, visibility: np.ndarray |
     total = _Sum(len(rows))
     receivers, unused = upload(fold(rows)), upload(np.zeros((1, 1, 4), np.float32))
     for start in range(0, lights.count if len(rows) else 0, _LIGHTS_AT_ONCE):
-        part = lights.take(slice(start, start + _LIGHTS_AT_ONCE))
-        seen = unused if visibility is None else upload(fold(visibility_bits(visibility[:, start:start + part.count])))
-        total.add(VPL_GATHER, part.count, {"lights": part.count, "has_visibility": int(visibility is not None),
+        some = lights.take(slice(start, start + _LIGHTS_AT_ONCE))
+        seen = unused if visibility is None else upload(fold(visibility_bits(visibility[:, start:start + some.count])))
+        total.add(VPL_GATHER, some.count, {"lights": some.count, "has_visibility": int(visibility is not None),
                                            "clamp_at": -1.0 if clamp is None else clamp},
-                  {"receivers": receivers, "lights": upload(fold(light_rows(part))), "visibility": seen})
+                  {"receivers": receivers, "lights": upload(fold(light_rows(some))), "visibility": seen})
     return total.result()

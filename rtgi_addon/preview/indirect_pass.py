@@ -11,7 +11,8 @@ import gpu
 import numpy as np
 
 from ..numerics import sh
-from ..scene import Scene, World
+from ..scene import Scene
+from ..transport.lights.world_sh import world_sh
 from .capture import Drawn
 from .device import dispatch
 from .program import Program
@@ -21,12 +22,12 @@ from .uniforms import UniformStruct
 
 class Indirect(Protocol):
     """One technique's indirect light on the GPU: ``program`` made by ``indirect_program``, and the ``uniforms`` and ``samplers`` of
-    the names that were given to it. ``includes_direct`` says that the light of lamps is in it already; ``error`` why it does not
-    follow the scene, or None. ``captures`` says that it is made of what is drawn: then it is followed with ``capture``, also when
-    objects move, else with ``follow``."""
+    the names that were given to it. ``direct_lamps`` names the lamps whose direct light is in it (see Field); ``error`` says why it
+    does not follow the scene, or is None. ``captures`` says that it is made of what is drawn: then it is followed with ``capture``,
+    also when objects move, else with ``follow``."""
 
     program: Program
-    includes_direct: bool
+    direct_lamps: frozenset[str] | None
     captures: bool
     error: str | None
 
@@ -67,7 +68,7 @@ def draw_indirect(indirect: Indirect, gbuffer: Mapping[str, gpu.types.GPUTexture
 class WorldLight:
     """The light of the world alone, as if nothing stood in its way: what is shown where there is no bake."""
 
-    includes_direct, captures, error = False, False, None
+    direct_lamps, captures, error = frozenset(), False, None
     program = indirect_program("indirect_world", (("world_light", UniformStruct("WorldLight", (("vec4", "cosine_sh", 9),))),))
 
     def __init__(self, scene: Scene):
@@ -100,22 +101,3 @@ class WorldLight:
 
     def close(self) -> None:
         """See Indirect."""
-
-
-def world_sh(world: World, order: int) -> np.ndarray:
-    """SH projection ((order + 1)², 3) of the world's radiance, texel by texel."""
-    pixels = np.asarray(world.equirect, np.float64)
-    if bool(np.all(pixels == pixels[:1, :1])):
-        result = np.zeros(((order + 1) ** 2, 3))
-        result[0] = pixels[0, 0] * np.sqrt(4.0 * np.pi)
-        return result
-    height, width = pixels.shape[:2]
-    azimuth = (0.5 - (np.arange(width) + 0.5) / width) * 2.0 * np.pi
-    latitude = ((np.arange(height) + 0.5) / height - 0.5) * np.pi
-    across = np.cos(latitude)[:, None]
-    local = np.stack([across * np.cos(azimuth), across * np.sin(azimuth), np.repeat(np.sin(latitude)[:, None], width, axis=1)], -1)
-    # Exact areas of the latitude bands.
-    edges = np.sin((np.arange(height + 1) / height - 0.5) * np.pi)
-    solid_angles = np.repeat(np.diff(edges) * (2.0 * np.pi / width), width)
-    directions = local.reshape(-1, 3) @ np.asarray(world.map_from_world, np.float64)
-    return sh.project(directions, pixels.reshape(-1, 3), solid_angles, order)

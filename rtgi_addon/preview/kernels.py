@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..techniques.kernels import NUMPY
-from . import capture, context, gather, light_volume
+from . import capture, context, gather, light_volume, voxel_crossings
 
 
 class GpuKernels:
@@ -27,21 +27,26 @@ class GpuKernels:
         """See Kernels."""
         return _here("rsm_gather", gather.rsm_gather)(maps, points, normals, pattern)
 
-    def lpv_inject(self, grid, positions: np.ndarray, normals: np.ndarray, flux: np.ndarray) -> np.ndarray:
+    def lpv_inject(self, grid, positions: np.ndarray, normals: np.ndarray, flux: np.ndarray, faces=None) -> np.ndarray:
         """See Kernels."""
-        return _here("lpv_inject", light_volume.inject)(grid, positions, normals, flux)
+        return _here("lpv_inject", light_volume.inject)(grid, positions, normals, flux, faces)
 
     def lpv_propagate(self, coefficients: np.ndarray, blocking, steps: int, *, threads=None, progress=None) -> np.ndarray:
         """See Kernels."""
         return _here("lpv_propagate", light_volume.propagate)(coefficients, blocking, steps, threads=threads, progress=progress)
 
-    def lpv_gather(self, grids, volumes, points: np.ndarray, normals: np.ndarray, dampening: bool = True) -> np.ndarray:
+    def lpv_gather(self, grids, volumes, points: np.ndarray, normals: np.ndarray, dampening: bool = False,
+                   faces=None) -> np.ndarray:
         """See Kernels."""
-        return _here("lpv_gather", gather.lpv_gather)(grids, volumes, points, normals, dampening)
+        return _here("lpv_gather", gather.lpv_gather)(grids, volumes, points, normals, dampening, faces)
 
     def vpl_gather(self, lights, points: np.ndarray, normals: np.ndarray, visibility, clamp) -> np.ndarray:
         """See Kernels."""
         return _here("vpl_gather", gather.vpl_gather)(lights, points, normals, visibility, clamp)
+
+    def voxel_crossings(self, grid, corners: np.ndarray, primitive: np.ndarray, axis: int, lines: int):
+        """See Kernels."""
+        return _here("voxel_crossings", voxel_crossings.crossings)(grid, corners, primitive, axis, lines)
 
 
 def _here(name: str, on_gpu: Callable) -> Callable:

@@ -4,6 +4,8 @@ import numpy as np
 
 # This share of the chances is the same for all lamps: a faint one that stands close by may matter most.
 _EVEN = 0.5
+# Halvings of the interval in which the scale of chances lies: more than a float64 tells apart.
+_BISECTIONS = 60
 
 
 def lamp_chances(power: np.ndarray, views: np.ndarray, budget: int) -> np.ndarray:
@@ -14,7 +16,7 @@ def lamp_chances(power: np.ndarray, views: np.ndarray, budget: int) -> np.ndarra
         return np.ones(count)
     importance = _EVEN / count + (1.0 - _EVEN) * np.asarray(power, np.float64) / max(float(np.sum(power)), 1e-30)
     low, high = 0.0, 1.0 / float(importance.min())
-    for _ in range(60):
+    for _ in range(_BISECTIONS):
         scale = 0.5 * (low + high)
         if float(np.sum(views * np.minimum(scale * importance, 1.0))) > budget:
             high = scale

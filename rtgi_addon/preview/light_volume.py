@@ -9,10 +9,11 @@ import numpy as np
 
 from ..progress import Progress
 from ..techniques.lpv.geometry_volume import Blocking
-from ..techniques.lpv.grid import PER_FLUX, PER_VECTOR, SIDE_AHEAD, LpvGrid
+from ..techniques.lpv.grid import LOBE_VECTOR, PER_FLUX, PER_VECTOR, LpvGrid
+from ..techniques.lpv.injection import INJECTION_CELLS
 from .atlas import Atlas
 from .device import RenderTarget, bind, dispatch, uniform_buffer, vertex_buffer
-from .packing import BLOCK_COLUMNS, FLUX_SCALE, face_blocks
+from .packing import BLOCK_COLUMNS, FLUX_SCALE, face_blocks, step_values, wall_texels
 from .programs import LPV_INJECT, LPV_PROPAGATE
 from .textures import download, empty, upload
 
@@ -26,8 +27,10 @@ def atlas_of(resolution) -> Atlas:
     return Atlas.of(resolution, gpu.capabilities.max_texture_size_get() // BLOCK_COLUMNS)
 
 
-def inject_lights(grid: LpvGrid, positions: np.ndarray, normals: np.ndarray, flux: np.ndarray) -> LightTextures:
-    """Coefficients of virtual lights as textures: every light is a point, blended additively into its cell's texel."""
+def inject_lights(grid: LpvGrid, positions: np.ndarray, normals: np.ndarray, flux: np.ndarray,
+                  faces: np.ndarray | None = None) -> LightTextures:
+    """Coefficients of virtual lights as textures: every light is a point, blended additively into its cell's texel. ``faces`` as of
+    techniques.lpv.standing."""
     atlas = atlas_of(grid.resolution)
     target = RenderTarget(*atlas.size, ("RGBA32F",) * 3)
     with target.drawing(blend="ADDITIVE_PREMULT"):
@@ -36,21 +39,23 @@ def inject_lights(grid: LpvGrid, positions: np.ndarray, normals: np.ndarray, flu
             vertices = {"cell_position": grid.cells_of(positions), "normal": normals, "flux": flux}
             buffer = vertex_buffer({name: np.asarray(values, np.float32) for name, values in vertices.items()})
             values = {"resolution": grid.resolution, "columns": atlas.columns, "size": atlas.size, "per_flux": PER_FLUX,
-                      "per_vector": PER_VECTOR, "corner": grid.corner, "cell": grid.cell, "level": 0}
+                      "per_vector": LOBE_VECTOR * PER_VECTOR, "corner": grid.corner, "cell": grid.cell, "level": 0,
+                      "distance": INJECTION_CELLS}
+            walls = upload(wall_texels(atlas, faces))
             gpu.state.program_point_size_set(True)
-            shader, _alive = bind(LPV_INJECT, uniforms={"parameters": values})
+            shader, _alive = bind(LPV_INJECT, uniforms={"parameters": values}, samplers={"level_walls": walls})
             gpu.types.GPUBatch(type="POINTS", buf=buffer).draw(shader)
             gpu.state.program_point_size_set(False)
     return target.colors
 
 
 class FaceTextures:
-    """What the faces between the cells of a volume do to light: a ``Blocking`` as two textures of blocks."""
+    """What the faces between the cells of a volume do to light: a ``Blocking`` as textures of blocks."""
 
     def __init__(self, resolution: tuple[int, int, int], blocking: Blocking):
         self.atlas = atlas_of(resolution)
-        self.bounces = blocking.reflectance is not None
-        self.faces, self.blockers = (upload(texels) for texels in face_blocks(self.atlas, blocking))
+        self.step_values = step_values(self.atlas, blocking)
+        self.faces, self.blockers, self.kept = (upload(texels) for texels in face_blocks(self.atlas, blocking))
 
 
 def propagate_light(light: LightTextures, faces: FaceTextures, steps: int, progress: Progress | None = None) -> LightTextures:
@@ -58,11 +63,9 @@ def propagate_light(light: LightTextures, faces: FaceTextures, steps: int, progr
     is overwritten. Raises Cancelled when asked to stop."""
     atlas = faces.atlas
     current, following, total = light, *(tuple(empty(*atlas.size) for _ in _CHANNELS) for _ in range(2))
-    values = {"resolution": atlas.resolution, "columns": atlas.columns, "size": atlas.size, "side_ahead": SIDE_AHEAD,
-              "bounces": int(faces.bounces)}
     # The first step begins the sum with the light itself.
     struct = LPV_PROPAGATE.uniforms[0][1]
-    first, further = (uniform_buffer(struct, {**values, "accumulate": accumulate}) for accumulate in (0, 1))
+    first, further = (uniform_buffer(struct, {**faces.step_values, "accumulate": accumulate}) for accumulate in (0, 1))
     for step in range(steps):
         if progress is not None:
             progress.step(step / steps, "propagating light")
@@ -70,7 +73,7 @@ def propagate_light(light: LightTextures, faces: FaceTextures, steps: int, progr
         images = {f"{kind}_{name}": texture for kind, textures in (("next", following), ("total", total))
                   for name, texture in zip(_CHANNELS, textures, strict=True)}
         dispatch(LPV_PROPAGATE, atlas.size, uniforms={"parameters": further if step else first},
-                 samplers={**samplers, "faces": faces.faces, "blockers": faces.blockers}, images=images)
+                 samplers={**samplers, "faces": faces.faces, "blockers": faces.blockers, "kept": faces.kept}, images=images)
         current, following = following, current
     return total
 
@@ -87,9 +90,10 @@ def download_light(light: LightTextures, atlas: Atlas, scale: np.ndarray | float
     return np.ascontiguousarray(np.stack(volumes, axis=1))
 
 
-def inject(grid: LpvGrid, positions: np.ndarray, normals: np.ndarray, flux: np.ndarray) -> np.ndarray:
+def inject(grid: LpvGrid, positions: np.ndarray, normals: np.ndarray, flux: np.ndarray,
+           faces: np.ndarray | None = None) -> np.ndarray:
     """See techniques.lpv.injection.inject; sums are in float32."""
-    return download_light(inject_lights(grid, positions, normals, flux), atlas_of(grid.resolution))
+    return download_light(inject_lights(grid, positions, normals, flux, faces), atlas_of(grid.resolution))
 
 
 def propagate(coefficients: np.ndarray, blocking: Blocking, steps: int, *, threads: int | None = None,

@@ -6,6 +6,7 @@ import gpu
 import numpy as np
 
 from ..scene import Channel, Material, Scene, Texture
+from ..transport.views.gbuffer import MOST_MATERIALS
 from .programs import MATERIAL_INPUTS
 from .textures import upload
 
@@ -22,8 +23,9 @@ class Slots:
         self.attributes = list(dict.fromkeys(channel.attribute for channel in channels if channel.attribute is not None))
 
 
-def uniforms(material: Material, slots: Slots, inputs: Iterable[str], first_instance: int) -> dict:
-    """Values of the struct MATERIAL for a draw whose instances begin at ``first_instance``."""
+def uniforms(material: Material, index: int, slots: Slots, inputs: Iterable[str], first_instance: int) -> dict:
+    """Values of the struct MATERIAL for number ``index`` of the scene's materials and a draw whose instances begin at
+    ``first_instance``."""
     count = len(MATERIAL_INPUTS)
     factor, addend, row_x, row_y = (np.zeros((count, 4), np.float32) for _ in range(4))
     source, filtering = np.full((count, 4), -1, np.int32), np.zeros((count, 4), np.int32)
@@ -35,7 +37,7 @@ def uniforms(material: Material, slots: Slots, inputs: Iterable[str], first_inst
         source[row], filtering[row] = _source(channel, slots), _filtering(channel.texture)
     threshold = -1.0 if material.alpha_threshold is None else material.alpha_threshold
     return {"factor": factor, "addend": addend, "uv_row_x": row_x, "uv_row_y": row_y, "source": source, "filtering": filtering,
-            "surface": (threshold, first_instance, 0.0 if material.is_opaque else 1.0, 0.0)}
+            "surface": (threshold, first_instance, 0.0 if material.is_opaque else 1.0, min(index, MOST_MATERIALS))}
 
 
 def _source(channel: Channel, slots: Slots) -> tuple[int, int, int, int]:
@@ -52,7 +54,7 @@ def _filtering(texture: Texture | None) -> tuple[int, int, int, int]:
 
 
 class Images:
-    """The scene's images as textures, each uploaded once: RGBA8 from bytes, RGBA32F from floats, encoded as they are stored."""
+    """The scene's images as textures: RGBA8 from bytes, RGBA32F from floats and half floats, coded as they are stored."""
 
     def __init__(self):
         self._uploaded: dict[int, tuple[Texture, gpu.types.GPUTexture]] = {}
@@ -69,7 +71,7 @@ class Images:
 
     def keep(self, scene: Scene) -> None:
         """Let go of images that no material of ``scene`` reads."""
-        used = {id(getattr(material, name).texture) for material in scene.materials for name in MATERIAL_INPUTS}
+        used = {id(channel.texture) for material in scene.materials for channel in material.channels()}
         self._uploaded = {key: entry for key, entry in self._uploaded.items() if key in used}
 
 

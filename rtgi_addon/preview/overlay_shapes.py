@@ -2,10 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import combinations
 
 import numpy as np
 
+from ..effects.spheres.maps import SphereProbes
 from ..numerics import grid as lattice
 from ..numerics import sh
 from ..scene import ProbeVolume
@@ -13,6 +14,12 @@ from ..techniques.base import BACKFACE_THRESHOLD, ProbeGrid
 
 # Radius of a probe's sphere, in shares of its cell's smallest side.
 PROBE_RADIUS = 0.12
+# Radius of a sphere probe's mirror ball, in shares of the shortest of its influence's half axes.
+MIRROR_RADIUS = 0.1
+# How far discs stand above the surface they lie on, in shares of their radius: hardly.
+DISC_HEIGHT = 0.02
+# How far a probe's colour goes from usable to moved before it counts as inside geometry.
+YELLOWEST = 0.5
 # Colours of a probe's state, scene-linear: usable, moved out of geometry, inside geometry.
 USABLE, MOVED, UNUSABLE = np.float32([[0.08, 0.5, 0.12], [0.9, 0.55, 0.04], [0.75, 0.03, 0.03]])
 
@@ -31,8 +38,7 @@ class Discs:
         """(n, 12) float32: what overlay_disc.vert.glsl reads of each."""
         count = len(self.points)
         rows = np.zeros((count, 12), np.float32)
-        # Above the surface they lie on, but hardly.
-        rows[:, :3], rows[:, 3] = self.points + 0.02 * self.radius * self.normals, self.radius
+        rows[:, :3], rows[:, 3] = self.points + DISC_HEIGHT * self.radius * self.normals, self.radius
         rows[:, 4:7], rows[:, 8:] = self.normals, self.colors
         return rows
 
@@ -46,24 +52,32 @@ def probe_rows(grids: Sequence[ProbeGrid], size: float = 1.0) -> tuple[np.ndarra
 
 
 def _rows_of(grid: ProbeGrid, order: int, blocks: int, size: float) -> np.ndarray:
-    own = grid.sh.reshape(-1, *grid.sh.shape[3:])
+    held = grid.sh.reshape(-1, *grid.sh.shape[3:])
     points = lattice.lattice_points(grid.volume.world_from_local, grid.volume.resolution) + grid.offset_world
-    side = lattice.cell_size(grid.volume.world_from_local, grid.volume.resolution).min()
-    channels = np.zeros((len(own), 3, 4 * blocks), np.float32)
-    channels[:, :, :own.shape[1]] = np.moveaxis(own, 1, 2) * sh.cosine_coefficients(grid.order)
-    head = np.zeros((len(own), 8), np.float32)
+    side = lattice.cell_size(grid.volume.world_from_local, grid.volume.nodes).min()
+    channels = np.zeros((len(held), 3, 4 * blocks), np.float32)
+    channels[:, :, :held.shape[1]] = np.moveaxis(held, 1, 2) * sh.cosine_coefficients(grid.order)
+    head = np.zeros((len(held), 8), np.float32)
     head[:, :3], head[:, 3], head[:, 4:7] = points.reshape(-1, 3), PROBE_RADIUS * size * side, state_colors(grid)
-    return np.concatenate([head, channels.reshape(len(own), -1)], axis=1)
+    return np.concatenate([head, channels.reshape(len(held), -1)], axis=1)[grid.counts.ravel()]
 
 
 def state_colors(grid: ProbeGrid) -> np.ndarray:
     """(p, 3) float32: green for probes that are used where they are, yellower the more of their hits were on backs; orange for
     those that were moved; red for those that lie inside geometry."""
     validity = grid.validity.reshape(-1)
-    moved = np.any(grid.offset_world.reshape(-1, 3) != 0, axis=1)
+    moved = grid.moved.reshape(-1)
     share = np.clip((1.0 - validity) / BACKFACE_THRESHOLD, 0.0, 1.0)[:, None]
-    usable = USABLE * (1.0 - 0.5 * share) + 0.5 * share * MOVED
+    usable = USABLE * (1.0 - YELLOWEST * share) + YELLOWEST * share * MOVED
     return np.where(moved[:, None], MOVED, np.where(share >= 1.0, UNUSABLE, usable)).astype(np.float32)
+
+
+def mirror_rows(spheres: SphereProbes, size: float = 1.0) -> np.ndarray:
+    """(p, 4) float32: centre and radius of the balls of sphere probes, ``size`` times as large as usual."""
+    probes = [item.probe for item in spheres.maps]
+    axes = [np.linalg.norm(np.asarray(probe.world_from_local)[:3, :3], axis=0).min() for probe in probes]
+    radii = [MIRROR_RADIUS * size * axis * probe.influence_distance for axis, probe in zip(axes, probes, strict=True)]
+    return np.float32([[*probe.centre_world, radius] for probe, radius in zip(probes, radii, strict=True)])
 
 
 def sphere_triangles(columns: int = 16, rows: int = 8) -> np.ndarray:
@@ -79,8 +93,7 @@ def sphere_triangles(columns: int = 16, rows: int = 8) -> np.ndarray:
 
 def box_lines(volumes: Sequence[ProbeVolume]) -> np.ndarray:
     """(2e, 3) float32: ends of the twelve edges of every volume's box."""
-    corners = np.array(list(product((-1.0, 1.0), repeat=3)))
-    pairs = [(a, b) for a in range(8) for b in range(a + 1, 8) if np.count_nonzero(corners[a] != corners[b]) == 1]
-    ends = corners[np.array(pairs).ravel()]
-    found = [lattice.transform_points(volume.world_from_local, ends) for volume in volumes]
-    return np.concatenate([np.zeros((0, 3)), *found]).astype(np.float32)
+    corners = lattice.UNIT_BOX
+    edges = [pair for pair in combinations(range(len(corners)), 2) if np.count_nonzero(np.diff(corners[list(pair)], axis=0)) == 1]
+    boxes = [lattice.transform_points(volume.world_from_local, corners[np.array(edges).ravel()]) for volume in volumes]
+    return np.concatenate([np.zeros((0, 3)), *boxes]).astype(np.float32)

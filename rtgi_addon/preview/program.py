@@ -13,11 +13,13 @@ GLSL_TYPES = {"FLOAT": "float", "VEC2": "vec2", "VEC3": "vec3", "VEC4": "vec4", 
 
 @dataclass(frozen=True)
 class Image:
-    """A texture that a compute program writes (``access`` 'WRITE') or also reads ('READ_WRITE'), by whole texels."""
+    """A texture that a compute program or a fragment stage writes (``access`` 'WRITE') or also reads ('READ_WRITE'), by whole
+    texels of ``kind``: floats, or whole numbers that many add to at once."""
 
     name: str
     format: str = "RGBA32F"
     access: str = "WRITE"
+    kind: str = "FLOAT_2D"
 
 
 @dataclass(frozen=True)
@@ -25,9 +27,10 @@ class Program:
     """A program made of the files ``shaders/NAME.STAGE.glsl``; ``vertex`` names another file for the vertex stage.
 
     ``uniforms`` are (name, struct) of the buffers. ``samplers`` names the 2D float textures that it fetches from, ``images`` those
-    it writes. A compute program has a ``local_size``; a raster program has ``inputs`` (vertex attributes), ``varyings`` and
-    ``outputs`` (one per render target), all (type, name) in GLSL_TYPES; ``flat_varyings`` are not interpolated. ``writes_depth``
-    says that the fragment stage sets gl_FragDepth. ``defines`` are compile-time parameters: (name, value).
+    that it, or its fragment stage, writes. A compute program has a ``local_size``; a raster program has ``inputs`` (vertex
+    attributes), ``varyings`` and ``outputs`` (one per render target), all (type, name) in GLSL_TYPES; ``flat_varyings`` are not
+    interpolated. ``writes_depth`` says that the fragment stage sets gl_FragDepth. ``defines`` are compile-time parameters: (name,
+    value).
     """
 
     name: str
@@ -57,9 +60,10 @@ def declarations(program: Program, stage: str, version: str = "430 core") -> str
     lines += [f"layout(binding = {unit}) uniform sampler2D {name};" for unit, name in enumerate(program.samplers)]
     if stage == "comp":
         lines.append("layout(local_size_x = {}, local_size_y = {}) in;".format(*program.local_size))
-        access = {"WRITE": "writeonly ", "READ_WRITE": ""}
-        lines += [f"layout({image.format.lower()}, binding = {unit}) uniform {access[image.access]}image2D {image.name};"
-                  for unit, image in enumerate(program.images)]
+    if stage != "vert":
+        access, kinds = {"WRITE": "writeonly ", "READ_WRITE": ""}, {"FLOAT_2D": "image2D", "UINT_2D_ATOMIC": "uimage2D"}
+        lines += [f"layout({image.format.lower()}, binding = {unit}) uniform {access[image.access]}{kinds[image.kind]} "
+                  f"{image.name};" for unit, image in enumerate(program.images)]
     if stage == "vert":
         lines += [f"layout(location = {slot}) in {GLSL_TYPES[kind]} {name};" for slot, (kind, name) in enumerate(program.inputs)]
     if stage in ("vert", "frag"):

@@ -1,27 +1,38 @@
 """The preview's pictures: G-buffer, direct light through shadow maps, indirect light of a field, averaged over jittered frames."""
 
+from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 
 import gpu
 import numpy as np
 
-from ..numerics.sampling import sobol_owen
+from ..effects import Chosen, concerned, in_order
+from ..effects.atlas.relight import STALE_ATLAS
+from ..effects.atlas.sheet import LightAtlas
+from ..effects.spheres.maps import SphereProbes
 from ..scene import Instance, Material, Mesh, Scene
+from ..scene.lights import NOT_AT_ALL, lamps_to_add
 from ..techniques.base import Field, validate_settings
-from .camera_view import CameraView
+from ..transport.context import changed_surfaces, same_values
+from ..transport.views.camera import CameraView
+from ..transport.views.drawn_instances import seen_by_cameras
+from ..transport.views.pixel_filter import sample_offset
 from .capture import Drawn
 from .direct_light import DirectLight
-from .film import Background, Film
+from .effects import make_halves
+from .effects.base import Before, GpuFrame
+from .film import Background, Film, Made
 from .gbuffer import GBuffer, gbuffer_surfaces
 from .indirect import FRAME_SAMPLES, make_indirect
 from .indirect_pass import Indirect, draw_indirect
+from .light_atlas import AtlasLight
 from .materials import Images
-from .pixel_filter import filter_offset
 from .settings import PASSES, PreviewSettings
 from .surfaces import SurfacePass
 from .textures import download, empty
 
-_FILTER_SEED = 0
+STALE_SPHERES = "sphere probes saw other lamps or another world: mirrors show the field's light until the next bake"
 
 
 class PreviewRenderer:
@@ -29,26 +40,31 @@ class PreviewRenderer:
     makes of what is drawn, else the world's own, unshadowed. All of it is GPU work: main thread only. ``passes`` of PASSES are
     what frames are kept of. ``baked`` is the scene that ``field`` was baked from (None: ``scene``): its geometry goes on
     reflecting when lamps move, in techniques that cannot do without a bake. Their ``scene`` must begin with the lamps and the
-    world of the bake.
+    world of the bake. ``effects`` (of effects.Chosen) make the combined pass of the lit picture.
     """
 
     def __init__(self, scene: Scene, field: Field | None = None, settings: PreviewSettings | None = None,
-                 passes: tuple[str, ...] = PASSES, baked: Scene | None = None, live=None):
+                 passes: tuple[str, ...] = PASSES, baked: Scene | None = None, live=None,
+                 effects: Iterable[Chosen] = ()):
         self.settings = settings or PreviewSettings()
         validate_settings(self.settings)
         self.scene, self.field, self._passes = scene, field, tuple(passes)
         self._images = Images()
         self._surfaces = _surfaces(scene, self._images)
-        self._bounds = scene_bounds(scene)
+        self._bounds, self._shown = scene_bounds(scene), seen_by_cameras(scene)
         self._background = Background(scene.world)
         self._lamps = DirectLight(self.settings)
         self._baked = baked or scene
         self._indirect: Indirect = make_indirect(field, self._baked, samples=FRAME_SAMPLES, live=live)
         if self._indirect.captures and (field is None or self._baked is not scene):
             self._capture()
+        self._lit_as_baked, self._atlas_light = True, AtlasLight()
+        self._effects = in_order(effects)
+        self._halves = make_halves(concerned(self._effects, scene))
         self._gbuffer: GBuffer | None = None
         self._film: Film | None = None
         self._view: CameraView | None = None
+        self._before: Before | None = None
 
     @property
     def samples(self) -> int:
@@ -64,6 +80,35 @@ class PreviewRenderer:
     def error(self) -> str:
         """Why indirect light does not follow the scene any more, or nothing."""
         return self._indirect.error or ""
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What else of the scene is not followed: by light that needs no bake, by sphere probes, and by the light atlas."""
+        stale = [] if self.field is None else [
+            told for told, baked, shown in ((STALE_SPHERES, self.field.spheres, self._spheres),
+                                            (STALE_ATLAS, self.field.atlas, self._atlas)) if baked is not None and shown is None]
+        return *getattr(self._indirect, "notes", ()), *stale
+
+    @property
+    def _spheres(self) -> SphereProbes | None:
+        """What sphere probes saw, under lamps and a world that are as they were."""
+        return self.field.spheres if self.field is not None and self._lit_as_baked else None
+
+    @property
+    def _atlas(self) -> LightAtlas | None:
+        """The light atlas, where it holds the light that is shown: of a bake that follows light by its transfer, the relit one."""
+        if self.field is None or self.field.atlas is None:
+            return None
+        if self.field.transfer is not None:
+            return self._indirect.atlas
+        follows = self._indirect.captures or getattr(self._indirect, "follows_surfaces", False)
+        moved = follows and changed_surfaces(self._baked, self.scene)
+        return self.field.atlas if self._lit_as_baked and not moved else None
+
+    @property
+    def lit_by(self) -> Field | None:
+        """The field whose light is shown: the one that was given, or what takes its place without a bake and is known here."""
+        return getattr(self._indirect, "field", None) or self.field
 
     def close(self) -> None:
         """Stop workers; this renderer is not used again."""
@@ -93,13 +138,16 @@ class PreviewRenderer:
         if self._film is not None:
             self._film.samples = 0
 
-    def configure(self, settings: PreviewSettings, passes: tuple[str, ...]) -> None:
-        """Draw with other ``settings`` and keep other ``passes`` from now on; surfaces and indirect light stay as they are."""
+    def configure(self, settings: PreviewSettings, passes: tuple[str, ...], effects: Iterable[Chosen] = ()) -> None:
+        """Draw with other ``settings`` and ``effects`` and keep other ``passes`` from now on; surfaces and indirect light stay as
+        they are."""
         validate_settings(settings)
         if replace(settings, samples=self.settings.samples, mode=self.settings.mode) != self.settings:
             self._lamps = DirectLight(settings)
         if tuple(passes) != self._passes:
             self._film = None
+        self._effects = in_order(effects)
+        self._apply_effects()
         self.settings, self._passes = settings, tuple(passes)
         self.reset()
 
@@ -113,22 +161,47 @@ class PreviewRenderer:
         lit = scene.world is not before.world or not _same(before.lights, scene.lights)
         edited = not (_same(before.meshes, scene.meshes) and _same(before.materials, scene.materials))
         moved = edited or not _same(before.instances, scene.instances)
+        if lit and self.field is not None and (self.field.spheres or self.field.atlas) is not None:
+            # Other lamps or another world: the bake's light may follow them, what sphere probes saw and texels hold does not.
+            self._lit_as_baked = same_values((scene.lights, scene.world), (self._baked.lights, self._baked.world))
         if edited or (moved and (self._surfaces is None or not self._surfaces.can_move(scene))):
             self._images.keep(scene)
             self._surfaces = _surfaces(scene, self._images, self._surfaces)
         elif moved:
             self._surfaces.move(scene)
         if moved:
-            self._bounds = scene_bounds(scene)
+            self._bounds, self._shown = scene_bounds(scene), seen_by_cameras(scene)
+        self._apply_effects()
         if self._indirect.captures:
             if lit or moved:
                 self._capture()
+        elif getattr(self._indirect, "follows_surfaces", False):
+            if lit or moved or scene.volumes is not before.volumes or scene.media is not before.media:
+                self._indirect.follow(scene)
         elif lit:
             self._indirect.follow(replace(self._baked, lights=scene.lights, world=scene.world))
         self.reset()
 
+    def _apply_effects(self) -> None:
+        effects = concerned(self._effects, self.scene)
+        if effects != tuple(half.chosen for half in self._halves):
+            self._halves = make_halves(effects)
+
+    @property
+    def _drawn(self) -> Drawn:
+        return Drawn(self.scene, self._surfaces, self._bounds)
+
     def _capture(self) -> None:
-        self._indirect.capture(Drawn(self.scene, self._surfaces, self._bounds))
+        # Lamps that no bake knows shine, and nothing that they light does.
+        scene = replace(self.scene, lights=tuple(light for light in self.scene.lights if light.bake != NOT_AT_ALL))
+        self._indirect.capture(replace(self._drawn, scene=scene))
+
+    def take_light(self) -> bool:
+        """Take over what a worker has made of the light since the last frame; True if the picture begins anew with it."""
+        changed = self._indirect.update()
+        if changed:
+            self.reset()
+        return changed
 
     def frame(self, view: CameraView, size: tuple[int, int]) -> None:
         """Average one more sample of ``view`` in, at ``size`` (width, height) pixels before the resolution scale; another view or
@@ -136,25 +209,40 @@ class PreviewRenderer:
         scaled = tuple(max(1, round(side * self.settings.resolution_scale)) for side in size)
         if self._film is None or self._film.size != scaled:
             self._allocate(scaled)
-        if self._indirect.update():
-            self.reset()
+        self.take_light()
         if not view.equals(self._view):
             self._view = view
             self.reset()
         index = self._film.samples
-        offset = filter_offset(sobol_owen(1, 2, _FILTER_SEED, start=index)[0]) if index else np.zeros(2)
-        self._gbuffer.draw(self._surfaces, view.drawn(scaled, offset, index))
+        offset = sample_offset(index)
+        self._gbuffer.draw(self._surfaces, view.drawn(scaled, offset, index), self._shown)
         inputs = {**self._gbuffer.textures, "direct": self._direct, "irradiance": self._irradiance}
-        # A bake that holds the lamps' light would be lit twice.
-        if self._surfaces is not None and not self._indirect.includes_direct:
-            self._lamps.draw(self.scene, self._surfaces, self._bounds, view, index, inputs, self._direct)
+        if self._surfaces is not None:
+            # What the bake holds of lamps would be lit twice.
+            added = lamps_to_add(self.scene.lights, self._indirect.direct_lamps)
+            self._lamps.draw(self.scene, added, self._surfaces, self._bounds, view, index, inputs, self._direct)
         draw_indirect(self._indirect, inputs, self._irradiance)
-        self._film.add(view, offset, inputs, self._background, self.settings.film_transparent)
+        self._atlas_light.draw(self._atlas, self.scene, self._gbuffer.textures, self._irradiance)
+        self._film.add(view, offset, inputs, self._background, self.settings.film_transparent,
+                       partial(self._with_effects, offset) if self._halves else None)
+        self._before = Before(self.scene, view, tuple(offset))
+
+    def _with_effects(self, offset, light: gpu.types.GPUTexture) -> Made:
+        """What all effects make of the lit picture ``light``."""
+        passes = {}
+        for half in self._halves:
+            light = half.draw(GpuFrame(
+                self._drawn, self.lit_by, self._view, self.size, self.gbuffer, self._direct, self._irradiance, light,
+                self._background, self._film.samples, tuple(offset), self.settings.film_transparent, self._before,
+                self._lamps, lamps_to_add(self.scene.lights, self._indirect.direct_lamps), passes, self._indirect, self._spheres))
+            passes.update(half.passes)
+        return Made(light, passes)
 
     def _allocate(self, size: tuple[int, int]) -> None:
         self._film = Film(size, self._passes)
         self._gbuffer = GBuffer(*size)
         self._direct, self._irradiance = empty(*size), empty(*size)
+        self._before = None
 
 
 def scene_bounds(scene: Scene) -> np.ndarray:

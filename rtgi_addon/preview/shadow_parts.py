@@ -6,9 +6,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..scene import SunLight
-from ..transport.shadow_views import ShadowView
-from .camera_view import CameraView
+from ..transport.lights.kinds import kind_of
+from ..transport.lights.shadow_view import ShadowView
+from ..transport.views.camera import CameraView
 from .lamp_sample import LampSample
 
 # Splits are this much nearer to a geometric series than to even steps (Zhang et al. 2006, parallel-split shadow maps).
@@ -17,6 +17,9 @@ _LOGARITHMIC = 0.8
 _NEAREST_SHARE = 0.005
 # Cascades end where frames' random share of this fraction of them puts it, so that their seams dissolve over frames.
 _SEAM = 0.15
+# And no nearer to the farthest depth than this share of it.
+_LATEST_SHARE = 0.5
+# Depths [m] that no pixel is outside of.
 _EVERYWHERE = -1e30, 1e30
 
 
@@ -55,7 +58,7 @@ def shadow_parts(sample: LampSample, camera: CameraView, bounds: np.ndarray, res
     if not sample.light.casts_shadow:
         yield ShadowPart(None)
         return
-    if isinstance(sample.light, SunLight):
+    if kind_of(sample.light).is_distant:
         splits = cascade_splits(camera, bounds, cascades, jitter[2])
         for near, far in pairwise(splits):
             focus = _focus(camera, bounds, near, far)
@@ -74,7 +77,7 @@ def cascade_splits(camera: CameraView, bounds: np.ndarray, count: int, jitter: f
     depth = (np.asarray(camera.world_from_camera)[:3, 3] - corners) @ np.asarray(camera.world_from_camera)[:3, 2]
     near, far = camera.depths
     far = max(min(far, float(depth.max())), 1e-6)
-    near = min(max(near, float(depth.min()), _NEAREST_SHARE * far), 0.5 * far)
+    near = min(max(near, float(depth.min()), _NEAREST_SHARE * far), _LATEST_SHARE * far)
     if camera.orthographic:
         return [float(value) for value in np.linspace(camera.depths[0], far, 2)]
     splits = []

@@ -11,10 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import BakeError
-from .lights import AreaLight, SunLight
+from ..machine.memory import available_bytes
+from ..numerics.grid import UNIT_BOX
+from .lights import AreaLight
 from .material import Channel
-from .memory import available_bytes, estimate_bytes
+from .memory import estimate_bytes, shortage
 from .scene import Scene
+from .sphere_probe import MOST_SPHERES
 
 # Heights below this share of the longest edge are float32 rounding, not a triangle.
 DEGENERATE = 1e-7
@@ -25,24 +28,36 @@ FAR_IN_SCENE_SIZES = 1000.0
 SMALLEST_SCENE, LARGEST_SCENE = 1e-3, 1e6  # metres
 # How far around the geometry, as a share of its diagonal, a volume still counts as in the scene.
 NEAR = 0.25
-UNIT_BOX = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float64)
 BROKEN_TRANSFORM = ("has NaN or infinity in its transform", "clear its location, rotation or scale")
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing found: ``severity`` is 'error' or 'warning', ``object`` names where it is (an object, material, light or volume),
-    ``message`` says what is wrong and ``remedy`` what to do."""
+    """One thing found: ``severity`` is 'error' or 'warning', ``object`` names where it is (an object, material, light or volume;
+    "" where ``message`` does), ``message`` says what is wrong and ``remedy`` what to do. ``objects`` are the names of what it is
+    about where ``object`` is not one."""
 
     severity: str
     object: str
     message: str
     remedy: str
+    objects: tuple[str, ...] = ()
+
+    @property
+    def subject(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """The names of the objects (lamps and volumes too) and of the materials that it is about."""
+        if self.objects:
+            return self.objects, ()
+        whole = self.object.partition(" (and ")[0]
+        kind, _, name = whole.partition(" ")
+        if kind == "material":
+            return (), (name,)
+        return ((name, whole) if kind in {"light", "volume"} else (whole,)), ()
 
     @property
     def cause(self) -> str:
         """What is wrong and where, as BakeError has it."""
-        return f"{self.object}: {self.message}"
+        return f"{self.object}: {self.message}" if self.object else self.message
 
     def __str__(self) -> str:
         return f"{self.cause}: {self.remedy}"
@@ -50,8 +65,9 @@ class Finding:
 
 def check_scene(scene: Scene, *, sh_order: int = 2, memory_bytes: int | None = None) -> list[Finding]:
     """Everything found in ``scene``, errors first. ``memory_bytes`` is what a bake may use (None: what the machine has left)."""
-    findings = [*_check_meshes(scene), *_check_instances(scene), *_check_materials(scene), *_check_lights(scene),
-                *_check_volumes(scene), *_check_memory(scene, sh_order, memory_bytes)]
+    findings = [*_check_omissions(scene), *_check_meshes(scene), *_check_instances(scene), *_check_materials(scene),
+                *_check_media(scene), *_check_lights(scene), *_check_volumes(scene), *_check_spheres(scene),
+                *_check_memory(scene, sh_order, memory_bytes)]
     return sorted(findings, key=lambda finding: finding.severity != "error")
 
 
@@ -61,6 +77,13 @@ def require(findings: Iterable[Finding]) -> None:
     if errors:
         more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
         raise BakeError(f"{errors[0].cause}{more}", errors[0].remedy)
+
+
+def _check_omissions(scene: Scene):
+    """What must be there before the light can be known."""
+    for omission in scene.omissions:
+        if omission.remedy:
+            yield Finding("error", "", omission.text, omission.remedy, omission.objects)
 
 
 def _used_meshes(scene: Scene) -> dict[int, str]:
@@ -213,14 +236,47 @@ def _extent(values: np.ndarray) -> tuple[float, float]:
     return (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)
 
 
+def _check_media(scene: Scene):
+    for medium in scene.media:
+        where = medium.name
+        coefficients = {"scattering": medium.scattering, "absorption": medium.absorption, "emission": medium.emission}
+        matrices = [part.world_from_local for part in (medium.bounds, medium.grid) if part is not None]
+        if not all(np.isfinite(matrix).all() for matrix in matrices):
+            yield Finding("error", where, *BROKEN_TRANSFORM)
+            continue
+        if any(np.linalg.matrix_rank(np.asarray(matrix)[:3, :3], SINGULAR) < 3 for matrix in matrices):
+            yield Finding("error", where, "is scaled to nothing along an axis", "give it a scale on all three axes")
+            continue
+        if medium.grid is not None:
+            if medium.grid.density.size == 0:
+                yield Finding("error", where, "has a medium on a grid without cells", "give its grid cells, or hide it")
+                continue
+            coefficients |= {f"grid of {name}": values for name in ("density", "scattering", "absorption", "emission")
+                             if (values := getattr(medium.grid, name)) is not None}
+        for name, values in coefficients.items():
+            lowest, highest = _extent(np.asarray(values))
+            if not (np.isfinite(lowest) and np.isfinite(highest)):
+                yield Finding("error", where, f"has NaN or infinity in its medium's {name}", "mend its nodes or its file")
+            elif lowest < 0:
+                yield Finding("error", where, f"has negative values in its medium's {name}", "give values from 0")
+        if medium.fills_space and np.any((np.asarray(medium.emission) > 0) & (medium.extinction <= 0)):
+            yield Finding("error", where, "gives light everywhere and takes none of it: along a ray into the sky it never ends",
+                          "give its volume a density that scatters or absorbs, or put the glow into a mesh")
+        if not abs(medium.phase.anisotropy) < 1:
+            yield Finding("error", where, f"scatters with an anisotropy of {medium.phase.anisotropy:g}",
+                          "give one between -1 and 1")
+
+
 def _check_lights(scene: Scene):
     shining = False
     for light in scene.lights:
-        power = np.asarray(light.irradiance if isinstance(light, SunLight) else
-                           light.radiance if isinstance(light, AreaLight) else light.intensity, np.float64)
+        power = light.strength
         where = f"light {light.name}"
         vectors = [power] + [np.asarray(getattr(light, name)) for name in (
             "position_world", "direction_world", "half_u_world", "half_v_world", "normal_world") if hasattr(light, name)]
+        if light.profile is not None:
+            vectors += [table for table in (light.profile.by_direction, light.profile.by_place, light.profile.by_distance)
+                        if table is not None]
         if not all(np.isfinite(vector).all() for vector in vectors):
             yield Finding("error", where, "has NaN or infinity in its power or transform", "mend its power, colour or transform")
             continue
@@ -239,6 +295,7 @@ def _check_lights(scene: Scene):
         yield Finding("warning", "world", "has negative radiance", "it is baked as black there: give a strength from 0")
     materials = scene.materials
     emissive = any(materials[index].is_emissive for index in used_materials(scene) if 0 <= index < len(materials))
+    emissive = emissive or any(medium.is_emissive for medium in scene.media)
     if not shining and scene.world.is_black and not emissive:
         dark = "all its lamps are at zero power" if scene.lights else "no lamp, a black world, no emissive material in use"
         yield Finding("error", scene.name or "scene", f"has no light ({dark})",
@@ -275,21 +332,26 @@ def _check_volumes(scene: Scene):
                 yield Finding("warning", where, "lies entirely outside the scene", "move it to where light is to be known")
 
 
+def _check_spheres(scene: Scene):
+    for probe in scene.spheres:
+        where = f"sphere probe {probe.name}"
+        if not probe.is_regular:
+            yield Finding("error", where, "has a transform or distance that makes no volume of it",
+                          "give it a scale on all three axes, and distances above 0", (probe.name,))
+        elif not 0 <= probe.clip_start < probe.clip_end:
+            yield Finding("error", where, f"has a Clip Start of {probe.clip_start:g} m and a Clip End of {probe.clip_end:g} m",
+                          "give an end beyond the start", (probe.name,))
+    if len(scene.spheres) > MOST_SPHERES:
+        yield Finding("error", scene.name or "scene", f"has {len(scene.spheres)} sphere probes, and {MOST_SPHERES} is the most "
+                      "that reflections are read from", "hide some of them from renders")
+
+
 def _apart(one: np.ndarray, other: np.ndarray) -> bool:
     """True if the axis-aligned boxes around two sets of points (n, 3) do not meet."""
     return bool(np.any(one.max(axis=0) < other.min(axis=0)) or np.any(other.max(axis=0) < one.min(axis=0)))
 
 
 def _check_memory(scene: Scene, sh_order: int, memory_bytes: int | None):
-    limit = available_bytes() if memory_bytes is None else memory_bytes
-    needs = estimate_bytes(scene, sh_order)
-    total = sum(needs.values())
-    if limit is None or total <= limit:
-        return
-    largest = max(needs, key=needs.get)
-    remedy = {"geometry": "hide what the probes do not need to see, or simplify its meshes",
-              "textures": "lower the size of its images",
-              "probes": "lower the volume's resolution or the SH order"}[largest]
-    gib = 2**30
-    yield Finding("error", scene.name or "scene", f"needs about {total / gib:.1f} GiB of memory, most of it for {largest} "
-                  f"({needs[largest] / gib:.1f}); {limit / gib:.1f} GiB are free", remedy)
+    found = shortage(estimate_bytes(scene, sh_order), available_bytes() if memory_bytes is None else memory_bytes)
+    if found is not None:
+        yield Finding("error", scene.name or "scene", *found)

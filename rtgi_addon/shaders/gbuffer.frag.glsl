@@ -7,7 +7,7 @@ void main()
   if (material.surface.z != 0.0 && is_transparent(alpha_image, primitive)) {
     discard;
   }
-  vec2 encoded = encoded_primitive(primitive);
+  vec2 encoded = encoded_surface(primitive, int(material.surface.w));
   out_position = vec4(position_world, encoded.x);
   out_normal = vec4(facing_normal(), encoded.y);
   out_albedo = vec4(clamp(material_input(INPUT_ALBEDO, albedo_image), 0.0, MAX_ALBEDO), float(instance_index));

@@ -11,7 +11,7 @@ void main()
     return;
   }
   LpvVolume volume = LpvVolume(parameters.resolution, parameters.columns, ivec2(0), parameters.total, parameters.along,
-                               parameters.surface_cells, parameters.behind, parameters.dampening != 0);
+                               parameters.surface_cells, parameters.dampening != 0);
   vec4 cells = list_texel(receivers, index, 2, 0);
   vec3 normal = list_texel(receivers, index, 2, 1).xyz;
   vec4 sum = imageLoad(irradiance, place);

@@ -1,5 +1,4 @@
-// What coarser cascades send through a face of this one's border, one of the five lights that go on from it (techniques/lpv/sources.py,
-// entering): `share` is the face's area times the light's part of what comes in.
+// What coarser cascades send through a face of this one's border (techniques/lpv/sources.py, entering): `share` is the face's area.
 #include "include/irradiance_lpv.glsl"
 #include "include/lpv_inject.glsl"
 

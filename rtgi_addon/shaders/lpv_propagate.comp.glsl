@@ -1,7 +1,7 @@
-// One step of light from cell to cell (techniques/lpv/propagation.py). A texel holds a channel's flux P and vector flux as
-// (P, Jy, Jz, Jx). Per cell and axis k, from the neighbour that sends in direction s:
-//   P' += t + w,  J'k += s t,  J'a += Ta Ja,  J'b += Tb Jb,  t = T0 (P + 2s Jk),  w = Tw (P + 2s c Jk)
-// and what the blockers at the cell's own faces send back.
+// One step of light from cell to cell (techniques/lpv/propagation.py). A texel holds a channel's flux P and vector flux F as
+// (P, Fy, Fz, Fx). Per cell and axis k, from the neighbour that sends in direction s through a face that lets T through:
+//   P' += T (P/6 + s F_k/3),  F'_k += T k (s P/9 + 2 F_k/9),  F'_a += T k 5 F_a/36
+// (k: what light keeps of its direction) and what the surfaces at the cell's own faces send back of P/6 + s F_k/3; of all of it, what media leave in the cell.
 #include "include/volume.glsl"
 
 // Where a vector's x, y and z stand in a texel.
@@ -35,6 +35,7 @@ void main()
     return;
   }
   Rgb own = light_of(texel);
+  vec4 open_above = texelFetch(faces, texel, 0);
   Rgb result;
   result.channel[0] = vec4(0.0);
   result.channel[1] = vec4(0.0);
@@ -51,27 +52,27 @@ void main()
         ivec2 from = atlas_texel(neighbour, resolution, parameters.columns);
         Rgb sent = light_of(from);
         // A face belongs to the cell below it.
-        vec4 through = block_texel(faces, axis, end == 0 ? from : texel);
+        float through = end == 0 ? texelFetch(faces, from, 0)[axis] : open_above[axis];
         for (int c = 0; c < 3; c++) {
-          vec4 light = sent.channel[c];
-          float front = through.x * (light.x + 2.0 * s * light[row]);
-          result.channel[c].x += front + through.y * (light.x + 2.0 * s * parameters.side_ahead * light[row]);
-          result.channel[c][row] += s * front;
-          result.channel[c][row_a] += through.z * light[row_a];
-          result.channel[c][row_b] += through.w * light[row_b];
+          vec4 light = through * sent.channel[c];
+          result.channel[c].x += parameters.flux_out * light.x + s * parameters.vector_out * light[row];
+          result.channel[c][row] += s * parameters.vector_of_flux * light.x + parameters.vector_ahead * light[row];
+          result.channel[c][row_a] += parameters.vector_across * light[row_a];
+          result.channel[c][row_b] += parameters.vector_across * light[row_b];
         }
       }
       if (parameters.bounces != 0) {
-        // Blocked shares and the blocker's normal along the axis and the next; its albedo and the normal along the last.
+        // The closed share, that of the flux which meets the surface and not its stairs, the surface's normal along the axis and the
+        // next; its albedo and the normal along the last.
         vec4 blocker = block_texel(blockers, 2 * (2 * axis + end), texel);
         vec4 surface = block_texel(blockers, 2 * (2 * axis + end) + 1, texel);
         for (int c = 0; c < 3; c++) {
           vec4 light = own.channel[c];
-          float met = blocker.x * (light.x + 2.0 * s * light[row]) +
-                      blocker.y * (light.x + 2.0 * s * parameters.side_ahead * light[row]);
-          // Light cannot be negative: the back of a lobe is returned whole, whatever the albedo.
-          float back = max(met, 0.0) * surface[c] + min(met, 0.0);
-          result.channel[c].x += back;
+          float met = parameters.flux_out * light.x * blocker.y + s * parameters.vector_out * light[row];
+          float spare = parameters.flux_out * light.x * (1.0 - blocker.y);
+          float back = blocker.x * met * surface[c];
+          result.channel[c].x += back + blocker.x * spare;
+          back *= parameters.lobe_vector;
           result.channel[c][row] -= s * back * blocker.z;
           result.channel[c][row_a] -= s * back * blocker.w;
           result.channel[c][row_b] -= s * back * surface.w;
@@ -79,16 +80,27 @@ void main()
       }
     }
   }
+  if (parameters.media != 0) {
+    vec3 flux = block_texel(kept, 0, texel).rgb;
+    vec3 direction = block_texel(kept, 1, texel).rgb;
+    for (int c = 0; c < 3; c++) {
+      result.channel[c] *= vec4(flux[c], vec3(direction[c]));
+    }
+  }
   imageStore(next_red, texel, result.channel[0]);
   imageStore(next_green, texel, result.channel[1]);
   imageStore(next_blue, texel, result.channel[2]);
-  // The sum begins with the light itself.
+  // The sum begins with the light itself; a wall's stairs may be larger or smaller than it is.
+  float area = open_above.w;
+  for (int c = 0; c < 3; c++) {
+    own.channel[c] *= area;
+  }
   if (parameters.accumulate != 0) {
     own.channel[0] = imageLoad(total_red, texel);
     own.channel[1] = imageLoad(total_green, texel);
     own.channel[2] = imageLoad(total_blue, texel);
   }
-  imageStore(total_red, texel, own.channel[0] + result.channel[0]);
-  imageStore(total_green, texel, own.channel[1] + result.channel[1]);
-  imageStore(total_blue, texel, own.channel[2] + result.channel[2]);
+  imageStore(total_red, texel, own.channel[0] + area * result.channel[0]);
+  imageStore(total_green, texel, own.channel[1] + area * result.channel[1]);
+  imageStore(total_blue, texel, own.channel[2] + area * result.channel[2]);
 }

@@ -1,27 +1,20 @@
-"""GI techniques (rank 3): one file or folder each, discovered here; adding one is adding one file."""
+"""GI techniques (rank 3): one file or folder each, discovered here. A technique comes in as a file that ends in ``TECHNIQUE =
+Name()`` and bakes a `Field` which is the same from every view; what all readers of probes share is in `lattice/`.
+"""
 
-import importlib
-import pkgutil
 from functools import cache
 
-from ..errors import UsageError
-from .base import PRESETS, Checkpoint, Field, ProbeGrid, Technique, setting, validate_settings, volumes_by_settings
+from ..discovery import discover, named
+from .base import PRESETS, Cause, Checkpoint, Field, ProbeGrid, Technique, setting, validate_settings, volumes_by_settings
 
-__all__ = ["PRESETS", "Checkpoint", "Field", "ProbeGrid", "Technique", "get", "names", "registry", "setting", "validate_settings",
-           "volumes_by_settings"]
+__all__ = ["PRESETS", "Cause", "Checkpoint", "Field", "ProbeGrid", "Technique", "get", "names", "registry", "setting",
+           "validate_settings", "volumes_by_settings"]
 
 
 @cache
 def registry() -> dict[str, Technique]:
     """Every technique found in this folder, by name, in alphabetical order."""
-    found = {}
-    for info in sorted(pkgutil.iter_modules(__path__), key=lambda item: item.name):
-        if info.name == "base":
-            continue
-        technique = getattr(importlib.import_module(f"{__name__}.{info.name}"), "TECHNIQUE", None)
-        if technique is not None:
-            found[technique.name] = technique
-    return dict(sorted(found.items()))
+    return discover(__name__, __path__, "TECHNIQUE")
 
 
 def names() -> list[str]:
@@ -31,7 +24,4 @@ def names() -> list[str]:
 
 def get(name: str) -> Technique:
     """The technique called ``name``. Raises UsageError with the list of known ones."""
-    try:
-        return registry()[name]
-    except KeyError:
-        raise UsageError(f"unknown technique {name!r}", f"choose one of {', '.join(registry())}") from None
+    return named(registry(), name, "technique")

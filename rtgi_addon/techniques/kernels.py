@@ -1,4 +1,4 @@
-"""The inner loops of VPLs, RSMs and LPVs as functions from arrays to arrays, so that numpy and the GPU can take each other's place.
+"""Inner loops of VPLs, RSMs, LPVs and voxels as functions from arrays to arrays: numpy and the GPU can take each other's place.
 
 ``Technique.bake(..., kernels=...)`` takes any object that keeps this protocol; ``NUMPY`` is the one for the CPU, and what a GPU's
 must agree with. Signatures and conventions are those of the numpy functions that ``NumpyKernels`` names.
@@ -10,27 +10,31 @@ import numpy as np
 
 
 class Kernels(Protocol):
-    """What the techniques vpl, rsm and lpv ask of a device."""
+    """What the techniques vpl, rsm and lpv, and those that go through voxels, ask of a device."""
 
     def capture(self, context, view):
-        """``transport.reflective_shadow_map.capture``: what the lamp of a ShadowView sees, as a ReflectiveShadowMap."""
+        """``transport.views.reflective_shadow_map.capture``: what the lamp of a ShadowView sees, as a ReflectiveShadowMap."""
 
     def rsm_gather(self, maps, points: np.ndarray, normals: np.ndarray, pattern) -> np.ndarray:
         """``techniques.rsm.gather.gather``: the paper's unoccluded gather, irradiance (n, 3)."""
 
-    def lpv_inject(self, grid, positions: np.ndarray, normals: np.ndarray, flux: np.ndarray) -> np.ndarray:
+    def lpv_inject(self, grid, positions: np.ndarray, normals: np.ndarray, flux: np.ndarray, faces=None) -> np.ndarray:
         """``techniques.lpv.injection.inject``: virtual lights into an SH volume (4, 3, nz, ny, nx)."""
 
     def lpv_propagate(self, coefficients: np.ndarray, blocking, steps: int, *, threads: int | None = None,
                       progress=None) -> np.ndarray:
         """``techniques.lpv.propagation.propagate``: the accumulated volume after some steps."""
 
-    def lpv_gather(self, grids, volumes, points: np.ndarray, normals: np.ndarray, dampening: bool = True) -> np.ndarray:
+    def lpv_gather(self, grids, volumes, points: np.ndarray, normals: np.ndarray, dampening: bool = False,
+                   faces=None) -> np.ndarray:
         """``techniques.lpv.gather.gather``: irradiance (n, 3) from accumulated volumes."""
 
     def vpl_gather(self, lights, points: np.ndarray, normals: np.ndarray, visibility: np.ndarray | None,
                    clamp: float | None) -> np.ndarray:
         """``techniques.vpl.gather.gather_visible``: irradiance (n, 3) from surface VPLs with known visibility (n, m)."""
+
+    def voxel_crossings(self, grid, corners: np.ndarray, primitive: np.ndarray, axis: int, lines: int):
+        """``transport.voxels.crossings.crossings``: where lines along an axis meet triangles, as Crossings."""
 
 
 class NumpyKernels:
@@ -38,7 +42,7 @@ class NumpyKernels:
 
     def capture(self, context, view):
         """See Kernels."""
-        from ..transport.reflective_shadow_map import capture
+        from ..transport.views.reflective_shadow_map import capture
         return capture(context, view)
 
     def rsm_gather(self, maps, points: np.ndarray, normals: np.ndarray, pattern) -> np.ndarray:
@@ -46,10 +50,10 @@ class NumpyKernels:
         from .rsm.gather import gather
         return gather(maps, points, normals, pattern)
 
-    def lpv_inject(self, grid, positions: np.ndarray, normals: np.ndarray, flux: np.ndarray) -> np.ndarray:
+    def lpv_inject(self, grid, positions: np.ndarray, normals: np.ndarray, flux: np.ndarray, faces=None) -> np.ndarray:
         """See Kernels."""
         from .lpv.injection import inject
-        return inject(grid, positions, normals, flux)
+        return inject(grid, positions, normals, flux, faces)
 
     def lpv_propagate(self, coefficients: np.ndarray, blocking, steps: int, *, threads: int | None = None,
                       progress=None) -> np.ndarray:
@@ -57,15 +61,21 @@ class NumpyKernels:
         from .lpv.propagation import propagate
         return propagate(coefficients, blocking, steps, threads=threads, progress=progress)
 
-    def lpv_gather(self, grids, volumes, points: np.ndarray, normals: np.ndarray, dampening: bool = True) -> np.ndarray:
+    def lpv_gather(self, grids, volumes, points: np.ndarray, normals: np.ndarray, dampening: bool = False,
+                   faces=None) -> np.ndarray:
         """See Kernels."""
         from .lpv.gather import gather
-        return gather(grids, volumes, points, normals, dampening)
+        return gather(grids, volumes, points, normals, dampening, faces)
 
     def vpl_gather(self, lights, points, normals, visibility, clamp) -> np.ndarray:
         """See Kernels."""
         from .vpl.gather import gather_visible
         return gather_visible(lights, points, normals, visibility, clamp)
+
+    def voxel_crossings(self, grid, corners, primitive, axis: int, lines: int):
+        """See Kernels."""
+        from ..transport.voxels.crossings import crossings
+        return crossings(grid, corners, primitive, axis, lines)
 
 
 NUMPY = NumpyKernels()

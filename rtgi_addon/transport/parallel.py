@@ -3,6 +3,7 @@
 import os
 from concurrent.futures import ThreadPoolExecutor
 
+from ..machine.memory import threads_that_fit
 from ..progress import Progress
 
 # Rays per unit of work: large enough to hide Python's overhead, small enough that a chunk's temporaries stay in cache.
@@ -22,10 +23,11 @@ def parallel_for(work, count: int, threads: int | None = None, progress: Progres
     """Call ``work(i)`` for i in 0…count−1 on several threads; return the results in order.
 
     The result must depend on ``i`` alone, which makes it the same for any number of threads. The first exception of a worker
-    is raised here, after the others have stopped; cancelling through ``progress`` raises ``Cancelled``.
+    is raised here, after the others have stopped; cancelling through ``progress`` raises ``Cancelled``. A thread for which there is
+    no memory is one thread less.
     """
     results = [None] * count
-    threads = min(thread_count(threads), count)
+    threads = threads_that_fit(min(thread_count(threads), count))
     if threads <= 1:
         for i in range(count):
             if progress is not None:

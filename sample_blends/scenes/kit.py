@@ -100,6 +100,15 @@ def material(name: str, albedo, emission=None, strength: float = 0.0, image: bpy
     return result
 
 
+def glossy(name: str, color, roughness: float, metallic: float = 0.0) -> bpy.types.Material:
+    """A Principled material with its layer: a metal, or a dielectric of Blender's default index."""
+    result = material(name, color)
+    bsdf = next(node for node in result.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    for socket, value in (("Specular IOR Level", 0.5), ("Roughness", roughness), ("Metallic", metallic)):
+        bsdf.inputs[socket].default_value = value
+    return result
+
+
 def picture(name: str, pixels: np.ndarray, floating: bool = False) -> bpy.types.Image:
     """A packed image from ``pixels`` (height, width, 3), row 0 at the bottom: sRGB-encoded 0–1, or linear floats."""
     height, width = pixels.shape[:2]
@@ -208,6 +217,19 @@ def probe_volume(name: str, low, high, resolution) -> bpy.types.Object:
     data.resolution_x, data.resolution_y, data.resolution_z = resolution
     obj = link(bpy.data.objects.new(name, data))
     obj.location, obj.scale = (low + high) / 2, (high - low) / 2
+    return obj
+
+
+def sphere_probe(name: str, low, high) -> bpy.types.Object:
+    """A Light Probe Sphere in the middle of the box from ``low`` to ``high``, which it stands for: its parallax is that box, and
+    its influence a little more, so that the box's own walls are in it."""
+    data = bpy.data.lightprobes.new(name, "SPHERE")
+    data.influence_type = data.parallax_type = "BOX"
+    data.influence_distance, data.falloff, data.use_custom_parallax, data.parallax_distance = 1.1, 0.05, True, 1.0
+    data.clip_start, data.clip_end = 0.01, 100.0
+    obj = link(bpy.data.objects.new(name, data))
+    obj.location = [0.5 * (a + b) for a, b in zip(low, high, strict=True)]
+    obj.scale = [0.5 * (b - a) for a, b in zip(low, high, strict=True)]
     return obj
 
 

@@ -33,7 +33,7 @@ def traces():
     owners = {owner.__name__ for owner in (bpy.types.Scene, bpy.types.LightProbe, bpy.types.Object, bpy.types.ViewLayer)
               if hasattr(owner, "rtgi") or hasattr(owner, "rtgi_preview")}
     panels = {name for name in dir(bpy.types) if "RTGI" in (getattr(getattr(bpy.types, name), "COMPAT_ENGINES", None) or ())}
-    header = {getattr(draw, "__name__", "") for draw in getattr(bpy.types.VIEW3D_HT_header.draw, "_draw_funcs", ())
+    header = {getattr(draw, "__name__", "") for draw in getattr(bpy.types.VIEW3D_MT_editor_menus.draw, "_draw_funcs", ())
               if draw.__module__.startswith("rtgi_addon")}
     return rtgi_classes() | rtgi_handlers() | owners | panels | header | set(dir(bpy.ops.rtgi))
 
@@ -77,7 +77,7 @@ def test_settings_are_saved_in_the_file(empty_blend, tmp_path):
 
 
 def test_a_registration_that_fails_half_way_leaves_nothing(monkeypatch):
-    from rtgi_addon.blender import panels
+    from rtgi_addon.blender.ui import panels
 
     def refuse():
         raise RuntimeError("no panels today")

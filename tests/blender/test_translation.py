@@ -73,9 +73,10 @@ def test_what_settings_are_made_of_is_in_the_catalogue():
     """Their composed tooltips would be found even if a word in them stayed English."""
     from dataclasses import fields
 
+    from rtgi_addon import effects, techniques
     from rtgi_addon.preview.settings import OverlaySettings, PreviewSettings
-    from rtgi_addon.techniques import registry
-    for settings in (*(technique.Settings for technique in registry().values()), PreviewSettings, OverlaySettings):
+    owners = *techniques.registry().values(), *effects.registry().values()
+    for settings in (*(owner.Settings for owner in owners), PreviewSettings, OverlaySettings):
         for item in fields(settings):
             for text in (item.metadata["label"], item.metadata["description"].rstrip(".")):
                 assert text in languages()["de_DE"].INTERFACE, f"{settings.__name__}.{item.name}: {text!r}"
@@ -109,9 +110,10 @@ def german(monkeypatch):
 def test_sentences_are_found_by_their_patterns(german):
     from rtgi_addon.errors import BakeError
     assert german(str(BakeError("every probe of the volume 'Hall: 2' lies inside geometry",
-                                "move or resize it so that it covers open space"))) == (
-        "jede Sonde des Volumens 'Hall: 2' liegt in Geometrie: so rücken oder skalieren, dass es freien Raum umfasst")
-    assert german("lamp Sun: light linking is not read, it lights everything").startswith("Lampe Sun: Lichtverknüpfung")
+                                "move or resize it so that it covers open space, or fit it to the scene"))) == (
+        "jede Sonde des Volumens 'Hall: 2' liegt in Geometrie: so rücken oder skalieren, dass es freien Raum umfasst, oder an die "
+        "Szene anpassen")
+    assert german("lamp Sun is invisible to diffuse rays: it is left out").startswith("Lampe Sun ist für diffuse")
     assert german("material 'Brick': its bumps are left out") == "Material „Brick“: seine Unebenheiten bleiben außen vor"
     assert german("unknown technique 'x': choose one of lpv, vpl") == "unbekannte Technik 'x': eines wählen von lpv, vpl"
     assert german("what nobody wrote: here") == "what nobody wrote: here"
@@ -122,15 +124,19 @@ def test_sentences_that_no_pattern_of_the_source_shows(german, monkeypatch):
     """Those that are put together elsewhere than where they are raised."""
     import scene_builders
 
-    from rtgi_addon.blender.extract.volumes import describe
+    from rtgi_addon import kernels
     from rtgi_addon.evaluate.leaks import Cause
-    from rtgi_addon.transport import rays
+    from rtgi_addon.techniques.lattice.fit import describe
+    from rtgi_addon.transport.rays import choose, embree
     said = [cause.text for cause in Cause if cause is not Cause.NONE] + ["3 of 2,000 receivers leak", "Relighting"]
     said.append(describe(scene_builders.closed_box().volumes[0]))
+    said += ["effect 'mist' has no setting 'x': choose one of start, depth"]
     said += ["'Probes' goes from 4 x 4 x 4 to 8 x 6 x 4 probes: finer.", "rsm leaves out the light of the world",
              "SH of order 2, 9 numbers a channel: the lattice is off by 4 % with it, which is more than is asked for."]
-    monkeypatch.setattr(rays, "rtcore_scene", None)
-    said.append(rays.slow_rays_warning())
+    with kernels.switched_off():
+        said.append(choose.slow_rays_warning())
+    monkeypatch.setattr(embree, "rtcore_scene", None)
+    said.append(choose.slow_rays_warning())
     for text in said:
         assert german(text) != text
 

@@ -96,9 +96,9 @@ def test_scripts_can_be_reloaded(blender, tmp_path):
     script.write_text(f"""
 import sys, addon_utils, bpy
 addon_utils.enable("{ADDON}", default_set=True)
-before = sys.modules["{ADDON}.rtgi_addon.blender.operators"]
+before = sys.modules["{ADDON}.rtgi_addon.blender.ui.bake_operators"]
 bpy.utils.load_scripts(reload_scripts=True)  # what the operator does, which puts it off until the window comes round
-after = sys.modules["{ADDON}.rtgi_addon.blender.operators"]
+after = sys.modules["{ADDON}.rtgi_addon.blender.ui.bake_operators"]
 classes = [cls for cls in bpy.types.Operator.__subclasses__() if cls.__name__ == "RTGI_OT_bake" and cls.is_registered]
 print("RELOADED", after is not before, len(classes), bpy.context.scene.rtgi.technique)
 """)

@@ -1,8 +1,8 @@
 """Every command and every piece of Python in the documentation is run, as it stands, on the smallest scene there is.
 
-A command runs in a folder of its own that holds FILE.blend, FILE.glb and BUNDLE; OUT, DIR and X.png are what it makes there. What
-this machine cannot run, or what would run all tests again, is in ELSEWHERE with the reason and the place that does run it; a
-command that is neither fails.
+A command runs in a folder of its own that holds FILE.blend, FILE.glb, BUNDLE, PREP and PARTS; OUT, DIR and X.png are what it makes
+there. What takes minutes does less of the same (FEWER). What this machine cannot run, or what would run all tests again,
+is in ELSEWHERE with the reason and the place that does run it; a command that is neither fails.
 """
 
 import os
@@ -34,22 +34,36 @@ class Elsewhere(NamedTuple):
 ELSEWHERE = [
     Elsewhere(r"make (test|test-fast)", "would run this very test again", ".ci/run"),
     Elsewhere(r"(RTGI_VENV=\S+ )?RTGI_PYTHON=\S+ make test", "would run this very test again, set up anew", ".ci/run"),
+    Elsewhere(r"make campaign", "takes an hour; a short form is in the suite", "tests/campaign"),
     Elsewhere(r"make lint", "is a step of its own", ".ci/run"),
     Elsewhere(r"make (bench|charts)", "takes many minutes; that its scripts are there is tested below",
               "tests/docs/test_commands.py"),
     Elsewhere(r"make extension", "downloads wheels", "tests/extension"),
+    Elsewhere(r"python tools/build_kernels\.py( --pin| --install)?", "downloads a compiler, and writes into tools/ and this Python",
+              "tests/kernels/test_build.py"),
+    Elsewhere(r"python tools/build_kernels\.py --checked PATH", "takes a C compiler with sanitizers",
+              "tests/kernels/test_build.py"),
     Elsewhere(r"\.ci/run", "would run this very test again", ".ci/run"),
     Elsewhere(r"blender --command extension (install-file|remove) .*", "needs a real Blender or its module with a user folder",
               "tests/extension"),
     Elsewhere(r'ln -s "\$PWD" ~/\.config/blender/.*', "would change this user's Blender", "tests/blender/conftest.py"),
+    Elsewhere(r"mkdir -p ~/\.config/blender/.*|blender -b --python-expr .*addon_enable.*", "would change this user's Blender",
+              "tests/blender/test_window.py"),
     Elsewhere(r"PATH_TO_BLENDER/\S+ -m pip install embreex", "needs a real Blender and a network", "tools/debian_tree.py"),
+    Elsewhere(r'python3 -m pip install "\.\[blender\]"|rtgi bake FILE\.blend --out OUT', "would download Blender",
+              "tests/blender/cli/test_first_steps.py"),
     Elsewhere(r"\.venv/bin/python -m rtgi_addon stability --out DIR", "takes minutes: every case of the suite",
               "tests/evaluate/test_stability.py"),
+    Elsewhere(r"rtgi farm PREP .*", "needs a cluster", "tests/jobs/test_farm.py"),
     Elsewhere(r"python -m rtgi_addon stability --case NAME .*", "NAME stands for what one has just written",
               "tests/evaluate/test_stability.py"),
 ]
 # What takes long even on the smallest scene.
 SLOW = re.compile(r" (chart|stability|plan|render)( |$)|--technique auto|make demo")
+# What takes minutes even there measures less of the same: options that are added to the command.
+FEWER = {"chart": ["--techniques", "probes", "--seeds", "1", "--points", "8", "--probes", "2", "--noise", "0.1",
+                   "--no-pictures"],
+         "stability": ["--case", "rotation", "--technique", "probes", "--no-variants"], "render": ["--samples", "4"]}
 NEEDS_GPU = re.compile(r" render ")
 
 
@@ -129,18 +143,25 @@ def test_scripts_that_are_named_are_there_and_take_their_options(page):
         script = ROOT / found[1]
         assert script.is_file(), code
         source = script.read_text(encoding="utf-8")
+        # Options that several scripts have are in a module beside them.
+        beside = [script.parent / f"{name}.py" for name in re.findall(r"^from (\w+) import", source, re.MULTILINE)]
+        source += "".join(path.read_text(encoding="utf-8") for path in beside if path.is_file())
         for option in re.findall(r"(?<!\S)(--[a-z][a-z-]+)", found[2]):
             assert f'"{option}"' in source, f"{code}: no {option}"
 
 
 @pytest.fixture(scope="session")
 def prepared(tiny_scene, tmp_path_factory):
-    """A folder with FILE.blend, FILE.glb and BUNDLE."""
+    """A folder with FILE.blend, FILE.glb, BUNDLE, PREP and its two PARTS."""
     folder = tmp_path_factory.mktemp("prepared")
     for path in (tiny_scene, tiny_scene.with_suffix(".glb")):
         shutil.copy(path, folder)
     done = run([sys.executable, "-m", "rtgi_addon", "FILE.blend", "bake", "--out", "BUNDLE", "--preset", "draft"], folder)
     assert done.returncode == 0, done.stderr
+    for words in (["FILE.blend", "prepare", "--out", "PREP", "--error", "0.2"], *(
+            ["bake", "PREP", "--part", f"{part}/2", "--out", f"PARTS/{part}"] for part in (1, 2))):
+        done = run([sys.executable, "-m", "rtgi_addon", *words], folder)
+        assert done.returncode == 0, done.stderr
     return folder
 
 
@@ -190,7 +211,7 @@ def test_the_command_does_what_it_says(command, folder):
     assert words is not None, f"{ALL[command]} has a command that no test knows: run it here, or say in ELSEWHERE who does"
     if words[1:2] and str(words[1]).endswith("settings_tables.py"):
         pytest.skip("writes into docs/; tests/docs/test_pages.py compares what it would write")
-    done = run(words, folder)
+    done = run([*words, *(option for name, options in FEWER.items() if name in words for option in options)], folder)
     if NEEDS_GPU.search(command) and done.returncode == 1 and re.search("OpenGL|libEGL|GPU", done.stderr):
         pytest.skip("needs a driver with OpenGL 4.3, which is not here")
     assert done.returncode == 0, f"{command}\n{done.stdout}{done.stderr}"
@@ -242,7 +263,7 @@ def test_python_runs_as_it_stands(page, code, folder):
     done = run([sys.executable, "snippet.py"], folder)
     assert done.returncode == 0, done.stderr
     if "last_bake" in code:
-        assert "8 probes, estimated error" in done.stdout and (folder / "light/bake.json").is_file()
+        assert "8 probes, light on surfaces off by" in done.stdout and (folder / "light/bake.json").is_file()
 
 
 def test_the_reader_on_the_page_reads_what_the_bake_measured(folder):
@@ -250,7 +271,7 @@ def test_the_reader_on_the_page_reads_what_the_bake_measured(folder):
     import numpy as np
 
     from rtgi_addon.exchange.bundle import read_bundle
-    from rtgi_addon.techniques.probes.reconstruction import linear
+    from rtgi_addon.techniques.lattice.reconstruction import linear
     pytest.importorskip("OpenEXR", reason="needs OpenEXR")
     code = next(code for page, code in SNIPPETS if page.name == "engines.md")
     names = {}

@@ -1,4 +1,5 @@
-"""CONTRIBUTING says that a technique and an engine are one file each: its own examples are dropped into a copy of the package."""
+"""CONTRIBUTING says that a technique, an effect and an engine are one file each: its own examples are dropped into a copy of the
+package."""
 
 import json
 import re
@@ -11,8 +12,10 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = re.findall(r"```python\n(.*?)```", (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"), re.DOTALL)
-COPIED = ("rtgi_addon", "tests/techniques/test_matrix.py", "tests/exchange/engines", "tests/support", "tests/conftest.py",
-          "pyproject.toml")
+SHADER = re.search(r"```text\n(#include \"include/effect.glsl\".*?)```", (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"),
+                   re.DOTALL)[1]
+COPIED = ("rtgi_addon", "tests/techniques/test_matrix.py", "tests/effects/test_every_effect.py", "tests/gpu/test_every_effect.py",
+          "tests/exchange/engines", "tests/support", "tests/conftest.py", "pyproject.toml")
 
 
 def example(name):
@@ -24,7 +27,7 @@ def example(name):
 
 @pytest.fixture(scope="module")
 def copy(tmp_path_factory):
-    """The package and what tests it, with both examples in place and nothing else changed."""
+    """The package and what tests it, with the examples in place and nothing else changed."""
     root = tmp_path_factory.mktemp("copy")
     for name in COPIED:
         source, target = ROOT / name, root / name
@@ -34,6 +37,7 @@ def copy(tmp_path_factory):
         else:
             shutil.copyfile(source, target)
     (root / "rtgi_addon/techniques/paths.py").write_text(example("TECHNIQUE"), encoding="utf-8")
+    (root / "rtgi_addon/effects/zebra.py").write_text(example("EFFECT"), encoding="utf-8")
     (root / "rtgi_addon/exchange/engines/plain.py").write_text(example("ENGINE"), encoding="utf-8")
     return root
 
@@ -55,6 +59,23 @@ def test_the_tests_of_engines_run_the_new_one(copy):
     assert " passed" in said and "failed" not in said
 
 
+def test_the_tests_of_effects_run_the_new_one(copy):
+    said = run(copy, "-m", "pytest", "-q", "tests/effects/test_every_effect.py", "-k", "zebra")
+    assert re.search(r"\b7 passed", said)
+
+
+@pytest.mark.parametrize("shader", [False, True])
+def test_the_preview_runs_the_new_effect_with_and_without_a_shader(copy, gpu_device, shader):
+    file = copy / "rtgi_addon/shaders/effect_zebra.comp.glsl"
+    if shader:
+        file.write_text(SHADER, encoding="utf-8")
+    try:
+        said = run(copy, "-m", "pytest", "-q", "tests/gpu/test_every_effect.py", "-k", "zebra")
+    finally:
+        file.unlink(missing_ok=True)
+    assert " passed" in said and "skipped" not in said
+
+
 PANEL = """
 import bpy, json, rtgi_addon
 rtgi_addon.register()
@@ -64,7 +85,9 @@ rtgi.use_preset("final")
 probe = bpy.data.lightprobes.new("Probes", "VOLUME")
 engines = bpy.context.scene.rtgi_export.bl_rna.properties["engine"].enum_items.keys()
 techniques = rtgi.bl_rna.properties["technique"].enum_items.keys()
-print("FOUND", json.dumps([rtgi.technique_paths.paths, probe.rtgi.technique_paths.override_paths, techniques, engines]))
+effects = bpy.context.scene.rtgi_effects
+print("FOUND", json.dumps([rtgi.technique_paths.paths, probe.rtgi.technique_paths.override_paths, techniques, engines,
+                           [effects.use_effect_zebra, effects.effect_zebra.width, bpy.types.RTGI_PT_use_effect_zebra.bl_label]]))
 rtgi_addon.unregister()
 """
 
@@ -72,8 +95,10 @@ rtgi_addon.unregister()
 def test_panel_presets_and_overrides_have_them(copy):
     pytest.importorskip("bpy", reason="needs Blender's Python module")
     said = run(copy, "-c", PANEL)
-    paths, override, techniques, engines = json.loads(next(line[6:] for line in said.splitlines() if line.startswith("FOUND")))
+    found = next(line[6:] for line in said.splitlines() if line.startswith("FOUND"))
+    paths, override, techniques, engines, effect = json.loads(found)
     assert paths == 4096 and override is False and "paths" in techniques and "plain" in engines
+    assert effect == [False, 4, "Zebra"]
 
 
 def test_the_shell_bakes_and_exports_with_them(copy, tiny_scene, tmp_path):
@@ -85,3 +110,4 @@ def test_the_shell_bakes_and_exports_with_them(copy, tiny_scene, tmp_path):
     written = json.loads((out / "Probes.json").read_text())
     assert written["resolution"] == [2, 2, 2] and len(written["radiance"][0][0][0]) == 9
     assert "paths" in run(copy, "-m", "rtgi_addon", "chart", "--help")
+    assert "stylized, zebra" in " ".join(run(copy, "-m", "rtgi_addon", "render", "--help").split())

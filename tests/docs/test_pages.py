@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rtgi_addon import techniques
+from rtgi_addon import effects, techniques
 from rtgi_addon.exchange import engines
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -70,6 +70,17 @@ def test_the_page_of_a_technique_has_its_settings(name):
     assert re.search(r"^Papers?: ", text, re.MULTILINE)
 
 
+@pytest.mark.parametrize("name", effects.names())
+def test_the_page_of_an_effect_has_its_settings(name):
+    effect, module = effects.get(name), tables()
+    text = module.page(effect).read_text(encoding="utf-8")
+    assert module.with_table(text, effect) == text, "run python tools/settings_tables.py"
+    for heading in ("## Formula", "## What it cannot do", "## When to use it", "## Settings"):
+        assert f"\n{heading}\n" in text
+    assert re.search(r"^(Source|Paper)s?: ", text, re.MULTILINE)
+    assert f"effects/{name}.md" in (ROOT / "docs/panel.md").read_text(encoding="utf-8")
+
+
 def test_the_table_of_presets_names_what_they_set():
     rows = {row.split("|")[1].strip(" `"): row for row in section(ROOT / "docs/panel.md", "## Presets").splitlines()
             if row.startswith("| `")}
@@ -98,10 +109,13 @@ def subcommands():
             for name in SUBCOMMANDS}
 
 
-@pytest.mark.parametrize("name", ["bake", "plan", "render", "chart", "stability", "export", "info"])
+@pytest.mark.parametrize("name", ["bake", "check", "verify", "plan", "render", "chart", "stability", "export", "info"])
 def test_every_option_is_on_the_page_and_no_other(name):
-    common = set(re.findall(r"--[a-z][a-z-]*", section(ROOT / "docs/shell.md", "## Options of every subcommand")))
-    assert common == {"--json", "--traceback", "--import"}
+    from rtgi_addon.blender.cli.parser import SUBCOMMANDS
+    everywhere, of_files = (set(re.findall(r"--[a-z][a-z-]*", section(ROOT / "docs/shell.md", heading)))
+                            for heading in ("## Options of every subcommand", "## What is read of a FILE"))
+    common = everywhere | (of_files if SUBCOMMANDS[name].takes_scene else set())
+    assert common <= subcommands()[name] and not (of_files & subcommands()[name] - common)
     shown = set(re.findall(r"--[a-z][a-z-]*", section(ROOT / "docs/shell.md", f"## `{name}")))
     options = subcommands()[name] - {"--help"} - common
     assert options <= shown, f"not on the page: {sorted(options - shown)}"

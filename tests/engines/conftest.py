@@ -12,7 +12,7 @@ import pytest
 
 from rtgi_addon.exchange import engines
 from rtgi_addon.exchange.bundle import Bundle
-from rtgi_addon.exchange.engines.conformance import kit_field
+from rtgi_addon.exchange.engines.kit import kit_field
 
 PACKAGES = Path(__file__).parent / "threejs"
 

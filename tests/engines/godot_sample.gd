@@ -25,6 +25,10 @@ func _initialize() -> void:
 	for frame in 90 if ball.visible else 5:
 		await RenderingServer.frame_post_draw
 	print("lamps ", scene.find_children("*", "Light3D", true, false).size(), ", camera ", viewport.get_camera_3d().name)
+	for lamp: Light3D in scene.find_children("*", "Light3D", true, false):
+		print("lamp ", lamp.name, " bakes ", lamp.light_bake_mode)
+	for mesh: MeshInstance3D in scene.find_children("*", "MeshInstance3D", true, false):
+		print("mesh ", mesh.name, " mode ", mesh.gi_mode)
 	var image := viewport.get_texture().get_image()
 	image.convert(Image.FORMAT_RGBF)
 	FileAccess.open(words[0], FileAccess.WRITE).store_buffer(image.get_data())

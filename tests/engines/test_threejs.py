@@ -3,18 +3,24 @@
 import json
 import os
 import re
+import shutil
 import subprocess
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import scene_builders as build
 
+from rtgi_addon import techniques
+from rtgi_addon.effects.stylized.settings import StylizedSettings
 from rtgi_addon.errors import BakeError
 from rtgi_addon.exchange import engines
-from rtgi_addon.exchange.engines import ExportSettings
+from rtgi_addon.exchange.bundle import Bundle
+from rtgi_addon.exchange.engines import ExportSettings, threejs
 from rtgi_addon.numerics import sh
-from rtgi_addon.techniques.probes.field import ProbeField
+from rtgi_addon.progress import Progress
+from rtgi_addon.techniques.lattice.field import ProbeField
 
 THREE = engines.get("threejs")
 TESTS = Path(__file__).parent / "threejs"
@@ -29,9 +35,9 @@ def run(node, *words, cwd, **environment):
 
 def read_probes(folder):
     """The description, the texels (p, 9, 4) of all probes and the numbers after them."""
-    description, data = json.loads((folder / "probes.json").read_text()), (folder / "probes.bin").read_bytes()
+    description, data = json.loads((folder / "rtgi/probes.json").read_text()), (folder / "rtgi/probes.bin").read_bytes()
     assert len(data) == description["data"]["bytes"]
-    count = sum(int(np.prod(volume["resolution"])) for volume in description["volumes"])
+    count = sum(volume.get("probes", int(np.prod(volume["resolution"]))) for volume in description["volumes"])
     texels = np.frombuffer(data, "<f2", count * 36).reshape(count, 9, 4).astype(np.float64)
     return description, texels, np.frombuffer(data, "<u2", offset=count * 72)
 
@@ -42,15 +48,16 @@ def test_every_name_finds_it():
 
 def test_files(export):
     names = {path.relative_to(export).as_posix() for path in export.rglob("*") if path.is_file()}
-    assert {"README.md", "index.html", "demo.js", "package.json", "probes.json", "probes.bin", "rtgi/RTGIProbeVolumes.js",
-            "rtgi/RTGIProbeVolumes.d.ts", "conformance.mjs", "conformance.html", "conformance/conformance.json"} <= names
+    assert {"README.md", "index.html", "demo.js", "package.json", "rtgi/probes.json", "rtgi/probes.bin", "rtgi/RTGIProbeVolumes.js",
+            "rtgi/RTGIProbeVolumes.d.ts", "rtgi/weights.js", "conformance.mjs", "conformance.html",
+            "conformance/conformance.json"} <= names
     assert json.loads((export / "demo.json").read_text()) == {"model": None}
     assert len((export / "README.md").read_text().strip().splitlines()) <= 12
 
 
 def test_every_file_that_a_page_names_is_there(export):
     for page in ("index.html", "demo.js", "conformance/webgl.js", "conformance/webgpu.js", "conformance.mjs",
-                 "rtgi/RTGIProbeVolumes.js", "rtgi/RTGIProbeLight.js"):
+                 "rtgi/RTGIProbeVolumes.js", "rtgi/RTGIProbeLight.js", "rtgi/shader.js"):
         text = (export / page).read_text()
         for name in re.findall(r"""(?:from|src=)\s*['"](\.[^'"]+)['"]""", text):
             assert ((export / page).parent / name).is_file(), f"{page} names {name}"
@@ -58,7 +65,7 @@ def test_every_file_that_a_page_names_is_there(export):
 
 def test_without_the_kit(kit_bundle, tmp_path):
     report = THREE.export(kit_bundle, tmp_path / "out", ExportSettings(conformance=False))
-    assert "probes.bin" in report.files and not [name for name in report.files if "conformance" in name]
+    assert "rtgi/probes.bin" in report.files and not [name for name in report.files if "conformance" in name]
 
 
 def test_the_model_goes_along(kit_bundle, tmp_path):
@@ -69,14 +76,14 @@ def test_the_model_goes_along(kit_bundle, tmp_path):
     assert json.loads((report.out / "demo.json").read_text()) == {"model": "model.glb"}
 
 
-def test_a_second_export_replaces_one_with_packages(kit_bundle, export):
+def test_a_second_export_leaves_packages_and_pages_alone(kit_bundle, export):
     (export / "node_modules" / "three").mkdir(parents=True)
     (export / "node_modules" / "three" / "package.json").write_text("{}")
     (export / "package-lock.json").write_text("{}")
-    THREE.export(kit_bundle, export)
     (export / "mine.js").write_text("")
-    with pytest.raises(BakeError, match=r"mine\.js"):
-        THREE.export(kit_bundle, export)
+    before = {path: path.read_bytes() for path in export.rglob("*") if path.is_file()}
+    assert THREE.export(kit_bundle, export).kept == ()
+    assert {path: path.read_bytes() for path in export.rglob("*") if path.is_file()} == before
 
 
 def test_coefficients_are_those_of_the_same_light_with_y_up(export, kit_bundle):
@@ -84,7 +91,7 @@ def test_coefficients_are_those_of_the_same_light_with_y_up(export, kit_bundle):
     description, texels, _ = read_probes(export)
     first, rng = 0, np.random.default_rng(1)
     for volume in description["volumes"]:
-        count = int(np.prod(volume["resolution"]))
+        count = volume.get("probes", int(np.prod(volume["resolution"])))
         lookup = next(item for item in ProbeField(kit_bundle.grids).lookups if item.volume.name == volume["name"])
         blender = rng.normal(size=(50, 3))
         blender /= np.linalg.norm(blender, axis=1, keepdims=True)
@@ -104,7 +111,8 @@ def test_distances_are_kept_to_a_step(export, kit_bundle):
         mean, deviation = np.moveaxis(found.reshape(grid.visibility.shape), -1, 0)
         assert np.abs(mean - grid.visibility[..., 0]).max() <= 0.51 * volume["distanceStep"]
         assert np.abs(deviation**2 + mean**2 - grid.visibility[..., 1]).max() < 4 * volume["distanceStep"] * mean.max()
-    assert len(stored) == 0
+    words = np.concatenate([grid.volume.scattered.index.ravel() for grid in kit_bundle.grids if grid.volume.scattered is not None])
+    assert np.array_equal(stored.view("<f4"), words)
 
 
 def test_light_beyond_halves_is_refused(kit_bundle, tmp_path):
@@ -122,7 +130,19 @@ def test_more_volumes_than_a_shader_holds_are_refused(kit_bundle, tmp_path):
 @pytest.mark.parametrize("release", ["three", "three-oldest"])
 def test_node_agrees(node, install_three, export, release):
     code, said = run(node, "conformance.mjs", cwd=install_three(export, release))
-    assert code == 0 and said.count("pass  ") == 7 and "PASSED: all 7" in said, said
+    assert code == 0 and said.count("pass  ") == 9 and "PASSED: all 9" in said, said
+
+
+def test_node_reads_fitted_probes_as_we_read_them(node, install_three, tmp_path):
+    """Coefficients and distances that a fit moved, in the 16 bits in which the export holds them."""
+    lattice = build.volume(resolution=(3, 3, 3), half_size=1.0)
+    room = replace(build.closed_box(0.7, light_position=(0.3, -0.2, 0.5)), volumes=(lattice,))
+    probes = techniques.get("probes")
+    grids = probes.bake(room, probes.Settings(error=0.1, fit=True), np.random.default_rng(1), Progress()).grids()
+    assert grids[0].fitted
+    bundle = Bundle(Path("fitted"), {"scene": "fitted", "includes_direct": False}, grids)
+    code, said = run(node, "conformance.mjs", cwd=install_three(THREE.export(bundle, tmp_path / "out").out))
+    assert code == 0 and "pass  bundle" in said and "FAIL" not in said, said
 
 
 def swapped_channels(texels):
@@ -164,7 +184,7 @@ def test_node_finds_distances_that_are_off(node, install_three, export):
 
 def _kit_probes(folder):
     kit = json.loads((folder / "conformance" / "kit.json").read_text())
-    return sum(int(np.prod(volume["resolution"])) for volume in kit["volumes"])
+    return sum(volume.get("probes", int(np.prod(volume["resolution"]))) for volume in kit["volumes"])
 
 
 @pytest.mark.parametrize("release", ["three", "three-oldest"])
@@ -175,18 +195,25 @@ def test_what_the_loader_promises(node, install_three, export, release):
 
 
 @pytest.mark.slow
-def test_types_fit_three(node, node_modules, install_three, export):
+def test_types_fit_three(node, node_modules, install_three, kit_bundle, tmp_path):
     """The declarations against three's own, and a program that uses them."""
-    install_three(export)
+    export = install_three(THREE.export(kit_bundle, tmp_path / "export", ExportSettings(style=StylizedSettings())).out)
+    # Exports have these where there are sphere probes and a light atlas.
+    for name in ("RTGISpheres.d.ts", "RTGIAtlas.d.ts", "RTGIVoxels.d.ts"):
+        shutil.copy(Path(threejs.__file__).parent / "export/rtgi" / name, export / "rtgi")
     (export / "node_modules" / "@types").symlink_to(node_modules / "@types", target_is_directory=True)
     for name in ("@dimforge", "@tweenjs", "fflate", "meshoptimizer"):
         (export / "node_modules" / name).symlink_to(node_modules / name, target_is_directory=True)
     (export / "use.ts").write_text("""
-import { Color, Mesh, MeshStandardMaterial, Scene, SphericalHarmonics3, Vector3 } from 'three';
+import { Camera, Color, Mesh, MeshStandardMaterial, Scene, SphericalHarmonics3, Vector3, WebGLRenderer } from 'three';
 import { RTGIProbeLight } from './rtgi/RTGIProbeLight.js';
+import { RTGIStyle, RTGIStyleView, loadStyle } from './rtgi/RTGIStyle.js';
 import { RTGILightProbe, RTGIProbeLoader, RTGIProbeVolumes } from './rtgi/RTGIProbeVolumes.js';
+import { loadSpheres } from './rtgi/RTGISpheres.js';
+import { loadAtlas } from './rtgi/RTGIAtlas.js';
 const scene = new Scene();
-const probes: RTGIProbeVolumes = await new RTGIProbeLoader().loadAsync('probes.json');
+const probes: RTGIProbeVolumes = await new RTGIProbeLoader().loadAsync('rtgi/probes.json');
+probes.addMirrors(await loadSpheres('rtgi/spheres.json')).addAtlas(await loadAtlas('rtgi/atlas.json')).addMirrors(null);
 scene.add(probes.apply(new Mesh(undefined, new MeshStandardMaterial())));
 const light = new RTGILightProbe(probes, 2).update(new Vector3());
 scene.add(light);
@@ -195,6 +222,9 @@ const sh: SphericalHarmonics3 = probes.radiance(e && new Vector3(), light.sh);
 probes.forEachProbe((position, live, volume) => { if (live) console.log(position.x, probes.volumes[volume].count, sh); });
 probes.intensity = 2;
 scene.add(probes, new RTGIProbeLight(probes));
+const style: RTGIStyle = (await loadStyle('rtgi/style.json')).apply(scene);
+new RTGIStyleView(style).render(new WebGLRenderer(), scene, new Camera(), (renderer, what, eye) => renderer.render(what, eye));
+style.release(scene).dispose();
 // @ts-expect-error: a number is no material
 probes.apply(3);
 probes.dispose();

@@ -10,7 +10,7 @@ import scene_builders as build
 from rtgi_addon.evaluate import costs
 from rtgi_addon.evaluate.costs import metered
 from rtgi_addon.transport.context import LightContext
-from rtgi_addon.transport.ray_counter import count_rays
+from rtgi_addon.transport.rays.ray_counter import count_rays
 
 MEBIBYTE = 1 << 20
 

@@ -121,3 +121,27 @@ def test_flicker_is_relative_and_temporal():
 def test_shapes_must_match():
     with pytest.raises(ValueError, match="shape"):
         metrics.relative_rmse(np.zeros((2, 3)), np.zeros((3, 3)))
+
+
+def test_sites_of_several_kinds_weigh_the_same():
+    ones = np.ones((4, 14, 3)), np.ones((4, 1, 3))
+    parts = [(2 * ones[0], ones[0], np.zeros((4, 14, 3))), (ones[1], ones[1], np.zeros((4, 1, 3)))]
+    assert metrics.relative_rmse_of_sites(parts).value == pytest.approx(np.sqrt(0.5))
+    assert metrics.noise_of_sites(parts) == 0.0
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.2])
+def test_the_noise_of_a_difference_is_that_of_repeated_measurements(offset):
+    rng = np.random.default_rng(4)
+    truth, sigma = rng.uniform(0.5, 1.5, (60, 1, 3)), 0.1
+    variance = np.full_like(truth, sigma**2)
+
+    def measured():
+        return [(truth * (1 + offset) + rng.normal(0, sigma, truth.shape), truth, variance)]
+
+    values = [metrics.relative_rmse_of_sites(measured()).value for _ in range(60)]
+    told = np.mean([metrics.noise_of_sites(measured()) for _ in range(20)])
+    if offset:
+        assert told == pytest.approx(np.std(values), rel=0.3)
+    else:
+        assert np.mean(np.array(values) > 1.645 * told) < 0.1

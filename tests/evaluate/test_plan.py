@@ -1,6 +1,7 @@
 """The planner, held to scenes whose best plan is known, and its predictions to real bakes at receivers that it did not see."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,14 +10,17 @@ from room_scenes import two_rooms
 
 from rtgi_addon import techniques
 from rtgi_addon.errors import BakeError, Cancelled, UsageError
+from rtgi_addon.evaluate.metrics import Figure
 from rtgi_addon.evaluate.plan import Target, make_plan
 from rtgi_addon.evaluate.plan.look import Motion
-from rtgi_addon.evaluate.plan.pilot import Pilot
+from rtgi_addon.evaluate.plan.pilot import RAYS_A_PROBE, Pilot
 from rtgi_addon.evaluate.plan.sample import NORMALS_PER_POINT, covered, draw_sample
-from rtgi_addon.evaluate.plan.search import upper
+from rtgi_addon.evaluate.plan.search import OVERSHOOT, Search
+from rtgi_addon.evaluate.plan.tries import upper
 from rtgi_addon.evaluate.references import PathReference
 from rtgi_addon.progress import Progress
 from rtgi_addon.transport.context import LightContext
+from rtgi_addon.transport.rays.ray_counter import count_rays
 
 # Held-back receivers: any seed that no plan uses.
 OTHER_SEED = 99
@@ -97,6 +101,29 @@ def test_a_pilot_says_of_a_lattice_what_its_bake_says():
     assert abs(bias) < 0.01, "the cache's irradiance is not the path tracer's"
 
 
+def test_what_a_plan_has_done_is_not_done_again():
+    """Probes of a lattice are traced once however many points ask, and a bake goes on with the plan's ray tracer and cache."""
+    scene = corner_lamp()
+    context = LightContext(scene, 1)
+    pilot = Pilot(context, scene.volumes, draw_sample(context, scene.volumes, 200, 1), (2,), 0.05, 0, Progress())
+    few, many = (pilot.measure(((9, 9, 9),), Progress(), level) for level in (0, -1))
+    assert few.probes < many.probes <= 729
+    assert pilot.spent == len(pilot.truth.mean) * pilot.receiver_rays + many.probes * RAYS_A_PROBE
+    method, settings = techniques.get("probes"), techniques.get("probes").Settings(error=0.1)
+    fields, rays = [], []
+    for begun in (None, pilot.begun):
+        with count_rays() as counter:
+            fields.append(method.bake(scene, settings, np.random.default_rng(0), Progress(), threads=1, begun=begun))
+        rays.append(counter.rays)
+    assert rays[1] < 0.7 * rays[0]
+    alone, continued = (field.irradiance(pilot.sample.receivers.points, pilot.sample.receivers.normals) for field in fields)
+    assert np.sqrt(np.mean((alone - continued) ** 2) / np.mean(alone**2)) < 0.05
+    # A bake to a smaller error takes a finer cache, and so one of its own.
+    exact = replace(settings, error=0.02)
+    assert pilot.begun.serves(context, scene.volumes, settings) and not pilot.begun.serves(context, scene.volumes, exact)
+    assert not pilot.begun.serves(LightContext(scene, 1), scene.volumes, settings)
+
+
 def test_what_cannot_be_met_is_said_with_the_best_there_is():
     scene = corner_lamp()
     few = make_plan(scene, Target(0.002, probes=100), others=False, points=64, threads=1)
@@ -116,6 +143,20 @@ def test_what_moves_keeps_the_air_and_is_told():
     said = " ".join(moving.reasons)
     assert "'Sun' moves" in said and "relit" in said and "'Door', 'Robot' move" in said
     assert "move" not in " ".join(still.reasons)
+
+
+def test_a_coarser_lattice_with_other_rays_is_looked_for_from_the_files_own(monkeypatch):
+    """What of a search decides nothing where lattices cost little is tried on a lattice of 8 times the file's probes whose error
+    is half the target, whatever its rays."""
+    pilot = SimpleNamespace(volumes=(build.volume(resolution=(4, 4, 4)),), orders=(2,))
+    prices = SimpleNamespace(rays=lambda reading, ray_error, points=None: (points or reading.lattice_points) / ray_error**2)
+    search = Search(pilot, prices, 0.1, lambda volumes, order: "", Progress())
+    fine = SimpleNamespace(lattice_points=8 * 64, error=lambda order, ray_error=0.0: Figure(0.05, 0.0))
+    coarse = SimpleNamespace(lattice_points=64)
+    asked = []
+    monkeypatch.setattr(search, "_settle", lambda *arguments: asked.append(arguments) or coarse)
+    assert search._exchange(fine, 2, 0.01, 1.0) == (coarse, 0.1)
+    assert asked == [(pytest.approx(2.0 * 0.5 * OVERSHOOT), 2, 0.1, 1.0)]
 
 
 def test_only_the_asked_order_and_what_is_not_planned_stays():

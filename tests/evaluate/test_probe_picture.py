@@ -9,11 +9,11 @@ from scene_builders import transform as moved
 from scene_builders import volume as grid_volume
 
 from rtgi_addon.errors import BakeError
-from rtgi_addon.evaluate.png import write_png
 from rtgi_addon.evaluate.probe_picture import Probes, draw_probes
 from rtgi_addon.evaluate.view import View, choose_view
 from rtgi_addon.numerics.grid import lattice_points
 from rtgi_addon.scene import Camera
+from rtgi_addon.storage.png import write_png
 from rtgi_addon.techniques import Field, ProbeGrid
 from rtgi_addon.transport.context import LightContext
 
@@ -25,11 +25,11 @@ L0 = 2.0 * np.sqrt(np.pi)  # the coefficient of a constant radiance of 1
 class UniformField(Field):
     """The same radiance from everywhere; ``validity`` (nz, ny, nx) marks probes inside geometry."""
 
-    def __init__(self, volume, radiance=1.0, validity=None, includes_direct=False):
+    def __init__(self, volume, radiance=1.0, validity=None, direct_lamps=frozenset()):
         shape = volume.resolution[::-1]
         coefficients = np.zeros((*shape, 4, 3), np.float32)
         coefficients[..., 0, :] = L0 * radiance
-        self._radiance, self.includes_direct = radiance, includes_direct
+        self._radiance, self.direct_lamps = radiance, direct_lamps
         self._grid = ProbeGrid(volume, coefficients, np.ones(shape, np.float32) if validity is None else validity,
                                np.ones((*shape, 8, 8, 2), np.float32), np.zeros((*shape, 3), np.float32),
                                np.zeros(shape, np.float32))
@@ -63,14 +63,15 @@ def looking(at=(0.0, 0.0, 0.0), distance=0.9):
 
 def test_png_reads_back_with_its_first_row_on_top(tmp_path):
     pixels = np.random.default_rng(0).integers(0, 256, (7, 5, 3), np.uint8)
-    path = write_png(tmp_path / "new folder" / "a.png", pixels)
+    (tmp_path / "folder").mkdir()
+    path = write_png(tmp_path / "folder" / "a.png", pixels)
     assert np.array_equal(np.asarray(Image.open(path)), pixels)
     assert [file.name for file in path.parent.iterdir()] == ["a.png"]
 
 
 def test_a_picture_that_cannot_be_written_says_so(tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(BakeError, match=r"cannot write the picture .*a\.png"):
+    with pytest.raises(BakeError, match=r"cannot write .*a\.png.*not a directory: correct the path"):
         write_png(tmp_path / "file" / "a.png", np.zeros((1, 1, 3), np.uint8))
 
 
@@ -96,7 +97,7 @@ def test_spheres_stand_where_their_probes_are(tmp_path):
     # Dark walls, bright probes: what is bright is the spheres, and their centres are the projected lattice.
     scene = replace(closed_box(albedo=0.0, resolution=(2, 1, 2), half_size=1.0), cameras=(looking(distance=0.95),))
     scene = replace(scene, volumes=(grid_volume(resolution=(2, 1, 2), half_size=0.4),))
-    picture = drawn(scene, UniformField(scene.volumes[0], includes_direct=True), tmp_path).sum(axis=-1)
+    picture = drawn(scene, UniformField(scene.volumes[0], direct_lamps=None), tmp_path).sum(axis=-1)
     view = choose_view(scene, LightContext(scene), SIZE)
     centres, _ = view.project(lattice_points(scene.volumes[0].world_from_local, (2, 1, 2)).reshape(-1, 3))
     for x, y in centres:
@@ -112,7 +113,7 @@ def test_lamps_light_the_walls_unless_the_field_has_them(tmp_path):
     lit = drawn(scene, UniformField(scene.volumes[0], radiance=1e-6), tmp_path)
     # The back wall is brightest in front of the lamp.
     assert lit[60, 80].sum() > 1.5 * lit[5, 5].sum()
-    flat = drawn(scene, UniformField(scene.volumes[0], radiance=1e-6, includes_direct=True), tmp_path)
+    flat = drawn(scene, UniformField(scene.volumes[0], radiance=1e-6, direct_lamps=None), tmp_path)
     assert np.array_equal(flat[60, 80], flat[5, 5])
 
 

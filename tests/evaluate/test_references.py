@@ -8,7 +8,7 @@ from rtgi_addon.evaluate.receivers import surface_receivers
 from rtgi_addon.evaluate.references import PathReference, limited
 from rtgi_addon.progress import Progress
 from rtgi_addon.transport.context import LightContext
-from rtgi_addon.transport.path import Estimate
+from rtgi_addon.transport.paths.reference import Estimate
 
 
 def reference_in(scene, noise, points=24, **options):
@@ -20,7 +20,7 @@ def test_the_integrating_sphere_within_its_own_noise():
     reference, receivers = reference_in(build.integrating_sphere(albedo=0.5, light_position=(0.4, 0, 0)), 0.01)
     truth = reference.irradiance(receivers.take(receivers.own))
     assert truth.noise < 0.012
-    # π of indirect irradiance everywhere (PHYSICS §2); the mean over 24 points errs by some fifth of one point's noise.
+    # π of indirect irradiance everywhere (docs/physics.md §2); the mean over 24 points errs by some fifth of one point's noise.
     assert truth.mean.mean() == pytest.approx(np.pi, rel=0.01)
 
 

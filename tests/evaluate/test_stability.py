@@ -34,6 +34,8 @@ from rtgi_addon.evaluate.stability.own import OWN_NAMES, own_cases
 from rtgi_addon.jobs.stability import run_stability
 from rtgi_addon.progress import Progress
 from rtgi_addon.scene import World
+from rtgi_addon.storage.png import write_png
+from rtgi_addon.storage.workplace import partial_of
 from rtgi_addon.techniques import names
 
 # What takes about a second; the others are marked slow.
@@ -42,14 +44,16 @@ FAST = {
     "lattice-on-walls": ("lpv",), "degenerate-mesh": ("rsm",), "refusal": ("probes", "vpl", "rsm", "lpv"), "scale": ("rsm",),
     "edge-bias": ("rsm",), "near-one-albedo": ("rsm", "lpv"), "lone-plate": ("probes", "vpl", "rsm", "lpv"),
     "spreading": ("probes", "vpl", "rsm", "lpv"), "resolution": ("probes", "vpl", "rsm"), "step-size": ("rsm", "lpv"),
-    "fireflies": ("rsm",),
+    "fireflies": ("rsm",), "media-steps": ("probes",), "media-thin": ("probes",),
+    "reflection-pan": ("screen_reflections",), "reflection-thickness": ("screen_reflections",),
+    "reflection-furnace": ("screen_reflections",),
 }
 FIGURES = [pytest.param(case.name, technique, marks=() if technique in FAST.get(case.name, ()) else pytest.mark.slow)
            for case, technique in stability.chosen()]
 # Remedies, and to what share of it they must bring the figure: (case, technique, what is left out instead, share).
 REMEDIES = [("wall-thickness", "probes", "plain trilinear", 0.01), ("wall-thickness", "lpv", "without blocking", 0.05),
-            ("lattice-on-walls", "probes", "without virtual offset", 0.1),
-            ("probe-in-geometry", "probes", "without virtual offset", 0.5),
+            ("lattice-on-walls", "probes", "without virtual offset, bias and lift", 0.1),
+            ("probe-in-geometry", "probes", "without virtual offset", 0.85),
             ("fireflies", "vpl", "bound at the mean irradiance", 0.5), ("fireflies", "vpl", "no clamp", 0.2),
             ("light-motion", "vpl", "virtual lights sampled anew each frame", 0.8)]
 
@@ -78,7 +82,8 @@ def test_shadow_rays_keep_reflective_shadow_maps_behind_the_wall():
 
 
 def test_every_technique_is_in_the_suite_and_every_weakness_has_a_reason():
-    assert {technique for case in CASES.values() for technique in case.limits} == set(names())
+    effects = {"ray_traced", "screen_reflections"}
+    assert {technique for case in CASES.values() for technique in case.limits} == set(names()) | effects
     assert set(limits.LIMITS) == set(CASES)
     for case in CASES.values():
         assert set(case.variants) <= set(case.limits)
@@ -149,6 +154,19 @@ def test_a_cancelled_run_keeps_what_was_measured(made_up, tmp_path):
         run_stability(tmp_path, cases=["made-up"], variants=False, progress=progress)
     data = json.loads((tmp_path / "stability.json").read_text())
     assert not data["complete"] and [entry["technique"] for entry in data["cases"]] == ["probes", "rsm"]
+    asked = []
+    object.__setattr__(made_up, "measure", lambda bench: asked.append(bench.technique) or measure(bench))
+    report = run_stability(tmp_path, cases=["made-up"], variants=False, resume=True)
+    assert asked == ["lpv"] and [result.verdict for result in report.results] == [HOLDS, WEAK, WORSE]
+    assert [result.worst.parameter for result in report.results] == ["second"] * 3
+    assert json.loads((tmp_path / "stability.json").read_text())["complete"] and not partial_of(tmp_path).exists()
+    # A whole report stays until there is another one.
+    before = (tmp_path / "stability.json").read_bytes()
+    object.__setattr__(made_up, "measure", measure_and_cancel)
+    progress = Progress()
+    with pytest.raises(Cancelled, match=r"is in .*\.partial, the report in .* is the earlier one"):
+        run_stability(tmp_path, cases=["made-up"], variants=False, progress=progress)
+    assert (tmp_path / "stability.json").read_bytes() == before and partial_of(tmp_path).exists()
 
 
 def test_the_worst_case_is_drawn(tmp_path):
@@ -157,6 +175,24 @@ def test_the_worst_case_is_drawn(tmp_path):
     picture = tmp_path / "pictures/baffle-lpv.png"
     assert picture.read_bytes().startswith(b"\x89PNG") and picture.stat().st_size > 2000
     assert "](pictures/baffle-lpv.png)" in (tmp_path / "stability.md").read_text()
+
+
+def test_pictures_outlive_an_interruption(made_up, tmp_path, monkeypatch):
+    progress = Progress()
+
+    def draw(result, path):
+        if result.technique == "rsm":
+            progress.cancel()
+        return write_png(path, np.full((2, 2, 3), len(result.technique), np.uint8))
+
+    monkeypatch.setattr("rtgi_addon.jobs.stability.draw_result", draw)
+    with pytest.raises(Cancelled):
+        run_stability(tmp_path / "whole", cases=["made-up"], progress=progress)
+    run_stability(tmp_path / "out", cases=["made-up"])
+    run_stability(tmp_path / "whole", cases=["made-up"], resume=True)
+    for name in ("probes", "rsm", "lpv"):
+        assert (tmp_path / f"whole/pictures/made-up-{name}.png").read_bytes() == \
+            (tmp_path / f"out/pictures/made-up-{name}.png").read_bytes()
 
 
 @pytest.mark.parametrize(("cases", "techniques", "word"), [
@@ -219,7 +255,7 @@ def test_every_kind_of_lamp_keeps_its_light_under_a_similarity():
     """The irradiance that a lamp gives grows with no size: intensity with its square, radiance not at all."""
     from rtgi_addon.scene import AreaLight, SpotLight
     from rtgi_addon.transport.context import LightContext
-    from rtgi_addon.transport.direct import lamp_irradiance
+    from rtgi_addon.transport.paths.direct import Receiver, lamp_irradiance
     down, half = np.float32([0, 0, -1]), np.float32([0.2, 0, 0])
     lamps = (AreaLight("area", np.float32([0.3, 0, 0.9]), half, np.float32([0, 0.2, 0]), down, np.full(3, 2.0, np.float32)),
              SpotLight("spot", np.float32([-0.4, 0, 0.8]), down, np.full(3, 3.0, np.float32), 1.2, 0.3, radius=0.05,
@@ -232,7 +268,7 @@ def test_every_kind_of_lamp_keeps_its_light_under_a_similarity():
     u = np.random.default_rng(1).random((len(points), 3), dtype=np.float32)
 
     def lit(taken, points, normals):
-        return lamp_irradiance(LightContext(taken), points, normals, normals, u)
+        return lamp_irradiance(LightContext(taken), points, Receiver(normals, normals), u)
 
     before = lit(built, points, normals)
     after = lit(parts.moved(built, grown, intensity=49.0), *parts.turned(points, normals, grown))
@@ -240,3 +276,26 @@ def test_every_kind_of_lamp_keeps_its_light_under_a_similarity():
     # The spot's disk is drawn in a frame of its own, which does not turn with the lamp: compare means of 64 samples.
     difference = (after - before).reshape(-1, 64, 3).mean(axis=1)
     assert np.abs(difference).mean() < 0.01 * before.mean()
+
+
+def test_the_airlight_that_a_lamp_in_fog_is_held_to_is_the_published_integral():
+    """Sun et al. 2005 in a form of its own: thin fog and a ray endless both ways give σ_s·I/(4h)."""
+    from rtgi_addon.evaluate.stability import media
+    found, distance = media.airlight(0.01, 200.0 * 0.01), 0.01
+    thin = media.SCATTERING / (4.0 * np.pi * distance) * (np.pi / 2 + np.arctan(200.0))
+    assert found == pytest.approx(thin * np.exp(-(media.SCATTERING + media.ABSORPTION) * 2.0), rel=0.01)
+
+
+@pytest.mark.parametrize(("name", "step"), [("media-steps", "4 slices"), ("media-thin", "4 mm")])
+def test_media_cases_notice_a_step_of_constant_light(monkeypatch, name, step):
+    """A picture that took what is in a part of a slice for all of it would fail them."""
+    from rtgi_addon.effects.media import froxels
+    exact = froxels.Presence.of
+
+    def by_slices(fillings, columns):
+        found, widths = exact(fillings, columns), np.diff(columns.shape.limits)[:, None]
+        return replace(found, length=[np.where(length > 0, widths, 0.0).astype(np.float32) for length in found.length])
+
+    monkeypatch.setattr(froxels.Presence, "of", staticmethod(by_slices))
+    result = stability.measure(CASES[name], "probes")
+    assert result.verdict == WORSE and {sample.parameter: sample.value for sample in result.samples}[step] > 0.05

@@ -1,60 +1,26 @@
-"""The bundle: what FORMATS.md promises about its files, its bytes, its checks and its neighbours."""
+"""The bundle: what docs/formats.md promises about its files, its bytes, its checks and its neighbours."""
 
 import errno
 import hashlib
 import json
 import os
+import shutil
+import threading
+from dataclasses import fields
 
 import numpy as np
 import pytest
-from scene_builders import closed_box, volume
-from tiny_technique import TILE, TinyField, tiny_grid
+from kills import needs_fork, refusing, run_killed
+from small_bundles import RESOLUTION, assert_same_grid, contents, make_grid, write
+from tiny_technique import TILE
 
 from rtgi_addon.errors import BakeError
 from rtgi_addon.exchange import bundle as bundle_module
-from rtgi_addon.exchange.bundle import check_bundle, check_target, read_bundle, write_bundle
+from rtgi_addon.exchange.bundle import check_bundle, check_target, read_bundle
 from rtgi_addon.exchange.exr import read_exr, write_exr
-from rtgi_addon.exchange.schema import RTGI_VERSION
-
-RESOLUTION = (3, 4, 5)
-
-
-def make_grid(name="Volume", order=1, seed=0, **replaced):
-    rng = np.random.default_rng(seed)
-    sh = rng.normal(size=(*RESOLUTION[::-1], (order + 1) ** 2, 3)).astype(np.float32)
-    return tiny_grid(volume(name, RESOLUTION, (1.0, 2.0, 3.0), (0.5, 0.0, -1.0)), sh, **replaced)
-
-
-def write(out, *grids, seconds=1.0, **options):
-    grids = grids or (make_grid(),)
-    return write_bundle(out, TinyField(grids, False, {}), closed_box(), settings={"order": 1}, seed=3,
-                        stats=lambda: {"rays": np.int64(9), "seconds": {"bake": seconds}}, **options)
-
-
-def contents(folder):
-    """Every file's bytes by relative name."""
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-
-
-def edit_manifest(folder, change):
-    manifest = json.loads((folder / "bake.json").read_text())
-    change(manifest)
-    (folder / "bake.json").write_text(json.dumps(manifest))
-
-
-def reseal(folder, name):
-    """Give a changed file the checksum it now has."""
-    digest = hashlib.sha256((folder / name).read_bytes()).hexdigest()
-    edit_manifest(folder, lambda manifest: manifest["sha256"].update({name: digest}))
-
-
-def assert_same_grid(found, expected):
-    for kind in ("sh", "validity", "visibility", "offset_world", "standard_error"):
-        assert np.array_equal(getattr(found, kind), getattr(expected, kind), equal_nan=True), kind
-        assert getattr(found, kind).dtype == np.float32
-    assert found.volume.name == expected.volume.name
-    assert found.volume.resolution == expected.volume.resolution
-    assert np.array_equal(found.volume.world_from_local, expected.volume.world_from_local)
+from rtgi_addon.exchange.schema import MAX_ORDER, RTGI_VERSION
+from rtgi_addon.storage.workplace import workplace
+from rtgi_addon.techniques.probes.settings import ProbeSettings
 
 
 @pytest.mark.parametrize("order", [0, 1, 2, 3])
@@ -156,39 +122,64 @@ def test_an_empty_folder_is_taken(tmp_path):
     assert len(read_bundle(write(tmp_path / "out")).grids) == 1
 
 
-def test_a_file_or_a_missing_parent_is_refused(tmp_path):
+def test_a_file_and_what_would_lie_in_one_are_refused(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(BakeError, match="is a file"):
         check_target(tmp_path / "file")
-    with pytest.raises(BakeError, match="does not exist"):
-        check_target(tmp_path / "none" / "out")
-    with pytest.raises(BakeError, match="does not exist"):
+    with pytest.raises(BakeError, match="is no folder"):
         check_target(tmp_path / "file" / "out")
+    assert check_target(tmp_path / "none" / "out") == tmp_path / "none" / "out" and not (tmp_path / "none").exists()
 
 
-@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EACCES, errno.EROFS])
-@pytest.mark.parametrize("stage", ["write_exr", "sync_file", "write_atomically", "swap_folder", "sync_folder"])
-def test_a_disk_that_refuses_leaves_the_old_bundle(tmp_path, monkeypatch, code, stage):
-    out = write(tmp_path / "out", make_grid("Old"))
-    before = contents(out)
+@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EACCES])
+def test_a_disk_that_refuses_any_operation_leaves_the_old_bundle_or_the_new(tmp_path, code):
+    out, seen, at = tmp_path / "out", set(), 0
+    while True:
+        at += 1
+        write(out, make_grid("Old"))
+        before, failure = contents(out), None
+        with refusing(at, tmp_path, OSError(code, os.strerror(code))) as names:
+            try:
+                write(out, make_grid("New"))
+            except BakeError as error:
+                failure = error
+        if len(names) < at:
+            break
+        assert failure is None or (os.strerror(code).lower() in failure.cause and failure.remedy), names
+        found = read_bundle(out).grids[0].volume.name
+        assert failure is None or found == "New" or contents(out) == before, names
+        seen.add((found, failure is None))
+        write(out, make_grid("Next"))
+        assert os.listdir(tmp_path) == ["out"], names
+    assert {("Old", False), ("New", True)} <= seen and at > 50
 
-    def refuse(*_, **__):
-        raise OSError(code, os.strerror(code), "somewhere")
 
-    monkeypatch.setattr(bundle_module, stage, refuse)
-    with pytest.raises(BakeError, match=f"(?i){os.strerror(code)}") as caught:
-        write(out, make_grid("New"))
-    assert caught.value.remedy
-    assert contents(out) == before
-    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+@needs_fork
+@pytest.mark.slow
+def test_a_kill_before_any_operation_leaves_the_old_bundle_or_the_new(tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "fsync", lambda descriptor: None)
+    out, seen, at = tmp_path / "out", set(), 0
+    while True:
+        at += 1
+        write(out, make_grid("Old"))
+        ended = run_killed(lambda: write(out, make_grid("New")) and None, at, tmp_path)[0] is not None
+        everything = contents(tmp_path)
+        name = read_bundle(out).grids[0].volume.name
+        assert contents(tmp_path) == everything, "reading it changed something"
+        seen.add(name)
+        write(out, make_grid("Next"))
+        assert os.listdir(tmp_path) == ["out"]
+        if ended:
+            break
+    assert seen == {"Old", "New"} and at > 50
 
 
-def test_a_full_disk_under_openexr_says_so(tmp_path):
-    if not os.path.exists("/dev/full"):
-        pytest.skip("this system has no /dev/full")
-    with pytest.raises(BakeError, match="no space left on device") as caught:
-        write_exr("/dev/full", {"Y": np.ones((4, 4), np.float32)}, {})
-    assert "free some space" in caught.value.remedy
+def test_a_full_disk_says_so_and_leaves_the_old_file(tmp_path):
+    write_exr(tmp_path / "a.exr", {"Y": np.ones((4, 4), np.float32)}, {})
+    before = contents(tmp_path)
+    with refusing(4, tmp_path, OSError(errno.ENOSPC, "")), pytest.raises(BakeError, match="no space left on device") as caught:
+        write_exr(tmp_path / "a.exr", {"Y": np.zeros((4, 4), np.float32)}, {})
+    assert "free some space" in caught.value.remedy and contents(tmp_path) == before
 
 
 @pytest.mark.parametrize("kind", ["sh", "visibility", "validity"])
@@ -200,79 +191,67 @@ def test_values_that_are_not_finite_are_never_written(tmp_path, kind):
     assert not any(tmp_path.iterdir())
 
 
-def test_a_swap_that_was_killed_is_mended(tmp_path):
+def put_aside(out):
+    """As a kill leaves it between the two renames that replace a bundle."""
+    for at in range(1, 500):
+        write(out, make_grid("Old"))
+        run_killed(lambda: write(out, make_grid("New")) and None, at, out.parent)
+        if not out.exists():
+            return
+    raise AssertionError("it was never put aside")
+
+
+@needs_fork
+def test_reading_finds_a_bundle_that_was_put_aside_and_mends_nothing(tmp_path):
     out = write(tmp_path / "out", make_grid("Old"))
     before = contents(out)
-    out.rename(tmp_path / "out.rtgi-old")
+    put_aside(out)
+    assert contents(out) == {}
+    everything = contents(tmp_path)
+    assert read_bundle(out).grids[0].volume.name == "Old" and check_bundle(out) and check_target(out) == out
+    out.mkdir()
     assert read_bundle(out).grids[0].volume.name == "Old"
-    assert contents(out) == before
-    # Killed after the new folder took its place, before the old one was removed.
-    write(tmp_path / "out.rtgi-old", make_grid("Older"))
-    assert check_target(out) == out
-    assert contents(out) == before and not (tmp_path / "out.rtgi-old").exists()
+    assert contents(tmp_path) == everything
+    with workplace(out, "test"):
+        assert contents(out) == before
+    assert os.listdir(tmp_path) == ["out"]
 
 
-@pytest.mark.parametrize("name", ["Volume/sh0.exr", "Volume/visibility.exr", "Volume/validity.exr"])
-def test_a_truncated_or_altered_file_is_named(tmp_path, name):
+def test_folders_that_are_only_called_like_ours_are_left_alone(tmp_path):
+    for name in ("out.rtgi-old", "out.rtgi-new", "out.old", "out.new"):
+        write(tmp_path / name, make_grid("Mine"))
+    before = contents(tmp_path)
+    (tmp_path / "out").mkdir()
+    with pytest.raises(BakeError):
+        read_bundle(tmp_path / "out")
+    write(tmp_path / "out", make_grid("Out"))
+    assert {name: data for name, data in contents(tmp_path).items() if not name.startswith("out/")} == before
+
+
+def test_a_bundle_that_was_changed_since_is_not_replaced(tmp_path):
     out = write(tmp_path / "out")
-    data = (out / name).read_bytes()
-    for damaged in (data[:len(data) // 2], b"", data[:-1] + bytes([data[-1] ^ 1])):
-        (out / name).write_bytes(damaged)
-        with pytest.raises(BakeError, match="checksum") as caught:
-            check_bundle(out)
-        assert str(out / name) in caught.value.cause
-    (out / name).unlink()
-    with pytest.raises(BakeError, match="is missing"):
-        read_bundle(out)
-
-
-def test_a_resealed_file_of_another_size_or_value_is_named(tmp_path):
-    out = write(tmp_path / "out")
-    planes, metadata = read_exr(out / "Volume/sh1.exr")
-    write_exr(out / "Volume/sh1.exr", {name: plane[:-1] for name, plane in planes.items()}, metadata)
-    reseal(out, "Volume/sh1.exr")
-    with pytest.raises(BakeError, match=r"sh1\.exr has the wrong size"):
-        read_bundle(out)
-    planes["B"][3, 1] = np.inf
-    write_exr(out / "Volume/sh1.exr", planes, metadata)
-    reseal(out, "Volume/sh1.exr")
-    with pytest.raises(BakeError, match=r"sh1\.exr holds values that are not finite"):
-        read_bundle(out)
-    write_exr(out / "Volume/sh1.exr", {"Y": planes["R"]}, metadata)
-    reseal(out, "Volume/sh1.exr")
-    with pytest.raises(BakeError, match=r"sh1\.exr has channels Y instead of R, G, B"):
-        read_bundle(out)
-
-
-@pytest.mark.parametrize("change", [
-    lambda manifest: manifest.pop("volumes"),
-    lambda manifest: manifest.update(sh_convention="something else"),
-    lambda manifest: manifest["volumes"][0].update(resolution=[3, 4]),
-    lambda manifest: manifest["volumes"][0].update(sh_order=2),
-    lambda manifest: manifest["volumes"][0].update(tiles={"columns": 1, "rows": 2}),
-    lambda manifest: manifest["volumes"][0].update(world_from_local=[[1.0]]),
-    lambda manifest: manifest["volumes"][0].update(validity="../../secret.exr"),
-    lambda manifest: manifest["sha256"].pop("Volume/sh0.exr"),
-    lambda manifest: manifest.update(volumes=[3]),
-])
-def test_a_manifest_that_contradicts_itself_is_refused(tmp_path, change):
-    out = write(tmp_path / "out")
-    edit_manifest(out, change)
-    with pytest.raises(BakeError, match=r"bake\.json is damaged, ") as caught:
-        read_bundle(out)
-    assert str(out) in caught.value.cause
-
-
-@pytest.mark.parametrize(("text", "match"), [
-    ("{", "not JSON"), ("[]", "schema None"), ('{"schema": "rtgi-bundle/9"}', "schema 'rtgi-bundle/9'"), ("\udcff", "is damaged"),
-])
-def test_a_damaged_manifest_is_refused_and_never_replaced(tmp_path, text, match):
-    out = write(tmp_path / "out")
-    (out / "bake.json").write_bytes(text.encode("utf-8", "surrogateescape"))
-    with pytest.raises(BakeError, match=match):
-        read_bundle(out)
-    with pytest.raises(BakeError, match="would be replaced"):
+    (out / "Volume" / "sh0.exr").write_bytes(b"painted over")
+    before = contents(tmp_path)
+    with pytest.raises(BakeError, match=r"holds Volume/sh0\.exr, which was changed since it was baked"):
         check_target(out)
+    assert contents(tmp_path) == before
+
+
+def test_what_is_put_into_a_bundle_while_it_is_replaced_is_named_and_kept(tmp_path, monkeypatch):
+    out = write(tmp_path / "out", make_grid("Old"))
+    real = bundle_module.replaceable
+
+    def late(path, contents=True):
+        ours = real(path, contents)
+        (path / "Old" / "notes").write_text("mine")
+        return ours
+
+    monkeypatch.setattr(bundle_module, "replaceable", late)
+    with workplace(out, "bake") as place:
+        with pytest.raises(BakeError, match=r"was replaced while somebody put Old/notes there") as caught:
+            write(place, make_grid("New"))
+    assert str(place.folder) in caught.value.remedy and read_bundle(out).grids[0].volume.name == "New"
+    assert (place.folder / "old/Old/notes").read_text() == "mine"
 
 
 def test_no_bundle_is_no_bundle(tmp_path):
@@ -284,3 +263,49 @@ def test_no_bundle_is_no_bundle(tmp_path):
 
 def test_the_version_is_the_packages(request):
     assert f'version = "{RTGI_VERSION}"' in (request.config.rootpath / "pyproject.toml").read_text()
+
+
+def test_every_order_that_is_baked_is_read():
+    (order,) = (item for item in fields(ProbeSettings) if item.name == "order")
+    assert order.metadata["maximum"] == MAX_ORDER
+
+
+@pytest.mark.parametrize("read", [read_bundle, check_bundle])
+def test_another_bake_in_a_folder_of_the_same_number_is_read_anew(tmp_path, monkeypatch, read):
+    # As file systems give the number of a removed folder to the next one.
+    out, other = write(tmp_path / "out", make_grid("A")), write(tmp_path / "other", make_grid("B"))
+    really_read = bundle_module.read_manifest
+
+    def replace_it_meanwhile(path):
+        manifest = really_read(path)
+        if other.exists():
+            for item in list(out.iterdir()):
+                shutil.rmtree(item) if item.is_dir() else item.unlink()
+            for item in list(other.iterdir()):
+                item.rename(out / item.name)
+            other.rmdir()
+        return manifest
+
+    monkeypatch.setattr(bundle_module, "read_manifest", replace_it_meanwhile)
+    found = read(out)
+    assert getattr(found, "manifest", found)["volumes"][0]["name"] == "B" and not other.exists()
+
+
+@pytest.mark.slow
+def test_reading_while_another_bake_replaces_it_gives_one_or_the_other(tmp_path):
+    out, stop = tmp_path / "out", threading.Event()
+    write(out, make_grid("A"))
+
+    def replace_it():
+        while not stop.is_set():
+            for name in ("B", "A"):
+                write(out, make_grid(name))
+
+    writer = threading.Thread(target=replace_it)
+    writer.start()
+    try:
+        found = [read_bundle(out).grids[0].volume.name for _ in range(60)]
+    finally:
+        stop.set()
+        writer.join()
+    assert set(found) == {"A", "B"}

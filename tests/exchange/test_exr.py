@@ -81,6 +81,9 @@ def test_a_stranger_is_refused(tmp_path, pixels):
 
 
 def test_a_refused_write_says_why(tmp_path, pixels):
-    with pytest.raises(BakeError, match="no such file or directory") as caught:
-        write_exr(tmp_path / "none" / "a.exr", {"Y": pixels[..., 0]}, {})
-    assert "create the folder" in caught.value.remedy
+    (tmp_path / "file").write_text("")
+    with pytest.raises(BakeError, match="not a directory") as caught:
+        write_exr(tmp_path / "file" / "a.exr", {"Y": pixels[..., 0]}, {})
+    assert "a part of it is a file" in caught.value.remedy
+    write_exr(tmp_path / "new" / "a.exr", {"Y": pixels[..., 0]}, {})
+    assert (tmp_path / "new/a.exr").is_file()

@@ -1,6 +1,8 @@
 """The EXR codec against the OpenEXR library, both ways, and against damage."""
 
 import struct
+import tracemalloc
+import zlib
 
 import numpy as np
 import pytest
@@ -107,6 +109,98 @@ def test_a_changed_byte_never_gets_through_as_another_error():
             except (DamagedFile, UnknownLayout):
                 refused += 1
     assert refused > len(data) / 2
+
+
+def chunked(height=40):
+    """A file of three chunks: its bytes, where its table of offsets begins, and the offsets."""
+    data = encode(planes(height, 3, names="Y"), {})
+    from rtgi_addon.exchange.exr_codec import _read_attributes
+    _, table = _read_attributes(data, 8)
+    return data, table, struct.unpack_from("<3Q", data, table)
+
+
+def with_table(data, table, offsets):
+    return data[:table] + struct.pack("<3Q", *offsets) + data[table + 24:]
+
+
+@pytest.mark.parametrize("order", [(0, 0, 2), (0, 1, 1), (2, 2, 2)])
+def test_a_chunk_that_is_missing_and_another_twice_leaves_no_pixel_to_chance(order):
+    data, table, offsets = chunked()
+    with pytest.raises(DamagedFile, match="does not begin where the one before it ends"):
+        decode(with_table(data, table, [offsets[index] for index in order]))
+
+
+@pytest.mark.parametrize("line", [0, 16, 1, -16, 48, 2**31 - 1])
+def test_a_chunk_of_lines_that_are_another_s_or_nobody_s_is_refused(line):
+    data, _, offsets = chunked()
+    changed = bytearray(data)
+    struct.pack_into("<i", changed, offsets[2], line)
+    with pytest.raises(DamagedFile, match="outside the image or is there twice"):
+        decode(bytes(changed))
+
+
+def test_chunks_may_be_listed_in_any_order():
+    data, table, offsets = chunked()
+    assert np.array_equal(decode(with_table(data, table, offsets[::-1]))[0]["Y"], planes(40, 3, names="Y")["Y"])
+
+
+@pytest.mark.parametrize("shift", [-8, -1, 1, 8, 2**40])
+@pytest.mark.parametrize("index", [0, 1, 2])
+def test_an_offset_into_something_else_is_refused(index, shift):
+    data, table, offsets = chunked()
+    moved = [offset + shift * (position == index) for position, offset in enumerate(offsets)]
+    with pytest.raises(DamagedFile):
+        decode(with_table(data, table, moved))
+
+
+def test_bytes_after_the_last_chunk_are_refused():
+    with pytest.raises(DamagedFile, match="follows the last chunk"):
+        decode(chunked()[0] + b"\0")
+
+
+def test_a_size_that_is_not_asked_for_is_refused_before_its_memory_is():
+    """Zeros pack a thousand to one: a small file may be a great image, but not where another was expected."""
+    data = encode({"Y": np.zeros((1024, 1024), np.float32)}, {})
+    assert len(data) < 2**14
+    tracemalloc.start()
+    with pytest.raises(DamagedFile, match="1024 × 1024 pixels instead of 3 × 20"):
+        decode(data, (20, 3))
+    assert tracemalloc.get_traced_memory()[1] < 2**16
+    tracemalloc.stop()
+    assert not decode(data, (1024, 1024))[0]["Y"].any()
+
+
+def test_a_chunk_that_would_unpack_to_more_is_stopped():
+    data, _, offsets = chunked(height=33)
+    bomb = zlib.compress(bytes(2**26), 9)
+    head = bytearray(data[:offsets[2] + 8])
+    struct.pack_into("<i", head, offsets[2] + 4, len(bomb))
+    tracemalloc.start()
+    with pytest.raises(DamagedFile, match=r"a chunk (holds more or less than its lines|is too long)"):
+        decode(bytes(head) + bomb)
+    assert tracemalloc.get_traced_memory()[1] < 2**20
+    tracemalloc.stop()
+
+
+def test_every_pixel_that_is_read_is_what_the_file_says():
+    """Whatever changes, decoding twice, over memory that was filled with something else between, gives the same."""
+    data = encode(planes(40, 3), {})
+    rng = np.random.default_rng(5)
+    read = 0
+    for _ in range(3000):
+        changed = bytearray(data)
+        for at in rng.integers(4, len(data), rng.integers(1, 4)):
+            changed[at] = rng.integers(256)
+        try:
+            first = decode(bytes(changed))[0]
+        except (DamagedFile, UnknownLayout):
+            continue
+        read += 1
+        noise = [rng.integers(0, 256, (40, 36), np.uint8) for _ in range(8)]
+        del noise
+        second = decode(bytes(changed))[0]
+        assert all(plane.tobytes() == second[name].tobytes() for name, plane in first.items())
+    assert read > 20
 
 
 @pytest.mark.parametrize("window", [(0, 0, 2**31 - 1, 2**31 - 1), (0, 0, -2, 5), (5, 0, 4, 5), (-2**31, 0, 2**31 - 1, 0)])

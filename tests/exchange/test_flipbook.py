@@ -1,4 +1,4 @@
-"""Flipbooks: every probe at the pixel that FORMATS.md says, and back."""
+"""Flipbooks: every probe at the pixel that docs/formats.md says, and back."""
 
 import numpy as np
 import pytest

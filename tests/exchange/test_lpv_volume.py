@@ -25,7 +25,8 @@ def field(value=None):
     volumes = [rng.normal(size=(4, 3, *grid.shape)).astype(np.float32) for grid in grids]
     if value is not None:
         volumes[1][0, 0, 0, 0, 0] = value
-    return LpvField(grids, tuple(volumes), params={"dampening": False}, stats={})
+    walls = rng.random((6, *grids[0].shape)).astype(np.float32)
+    return LpvField(grids, tuple(volumes), (walls, None), params={"dampening": False}, stats={})
 
 
 def test_files_give_the_field_back(tmp_path):
@@ -35,6 +36,7 @@ def test_files_give_the_field_back(tmp_path):
     back = read_lpv_volume(tmp_path)
     assert back.volume_grids == written.volume_grids and back.params == {"dampening": False}
     assert all(np.array_equal(a, b) for a, b in zip(back.volumes, written.volumes, strict=True))
+    assert np.array_equal(back.faces[0], written.faces[0]) and np.all(back.faces[1][:3] == 1) and not back.faces[1][3:].any()
     points, normals = np.random.default_rng(1).uniform(0, 2, (50, 3)), np.tile([0.0, 0, 1], (50, 1))
     assert np.array_equal(back.irradiance(points, normals), written.irradiance(points, normals))
 
@@ -54,15 +56,18 @@ def test_a_bundle_counts_them_and_is_checked(tmp_path):
     bundle = read_bundle(out)
     assert bundle.manifest["technique"] == "lpv" and bundle.manifest["lpv"] == "lpv/lpv.json"
     names = {name for name in bundle.manifest["sha256"] if name.startswith("lpv/")}
-    assert names == {"lpv/lpv.json", *(f"lpv/cascade{level}/sh{index}.exr" for level in range(2) for index in range(4))}
+    images = [*(f"sh{index}" for index in range(4)), "open", "crossing"]
+    assert names == {"lpv/lpv.json", *(f"lpv/cascade{level}/{image}.exr" for level in range(2) for image in images)}
     again = tmp_path / "again"
     bake_scene(build.closed_box(), "lpv", SETTINGS, again, threads=2)
     assert all((out / name).read_bytes() == (again / name).read_bytes() for name in bundle.manifest["sha256"])
     # A second bake replaces them, and one of probes takes them away.
     bake_scene(build.closed_box(), "lpv", SETTINGS, out)
+    whole = (out / "lpv/cascade1/sh2.exr").read_bytes()
     (out / "lpv/cascade1/sh2.exr").write_bytes(b"damaged")
     with pytest.raises(BakeError, match=r"lpv/cascade1/sh2\.exr is cut short or damaged"):
         read_bundle(out)
+    (out / "lpv/cascade1/sh2.exr").write_bytes(whole)
     bake_scene(build.closed_box(), "probes", {"rays": 16}, out)
     assert not (out / "lpv").exists() and "lpv" not in read_bundle(out).manifest
 
@@ -80,28 +85,27 @@ def test_what_is_not_finite_is_not_written(tmp_path, value):
         write_lpv_volume(tmp_path, field(value))
 
 
-def damage_json(path: Path):
-    path.write_text("{")
+def changed(**changes):
+    """A change of the first cascade's entry; None takes a key away."""
+    def change(path):
+        index = json.loads(path.read_text())
+        entry = index["cascades"][0]
+        index["cascades"][0] = {key: value for key, value in {**entry, **changes}.items() if value is not None}
+        path.write_text(json.dumps(index))
+
+    return change
 
 
 def other_schema(path: Path):
-    path.write_text(json.dumps({**json.loads(path.read_text()), "schema": "other"}))
+    path.write_text(json.dumps({**json.loads(path.read_text()), "schema": "rtgi-lpv/9"}))
 
 
-def no_cells(path: Path):
-    index = json.loads(path.read_text())
-    del index["cascades"][0]["cell"]
-    path.write_text(json.dumps(index))
-
-
-def wrong_size(path: Path):
-    index = json.loads(path.read_text())
-    index["cascades"][0]["resolution"] = [9, 9, 9]
-    path.write_text(json.dumps(index))
-
-
-@pytest.mark.parametrize(("damage", "words"), [(damage_json, "is damaged"), (other_schema, "has schema 'other'"),
-                                               (no_cells, "is damaged"), (wrong_size, "wrong size"), (Path.unlink, "cannot read")])
+@pytest.mark.parametrize(("damage", "words"), [
+    (lambda path: path.write_text("{"), "is damaged, it is not JSON"), (other_schema, "has schema 'rtgi-lpv/9'"),
+    (changed(cell=None), r"is damaged, cascades\[0\]\.cell is missing"), (changed(cell=0), "cell is 0, not from"),
+    (changed(resolution=[9, 9, 9]), r"tiles, 1 × 4, are not those of 9 slices"),
+    (changed(resolution=[3, 5, 4]), "pixels instead of"), (changed(corner=[0, 0, 0]), "they differ in corner"),
+    (changed(sh=["../sh0.exr"] * 4), "names no file inside the folder"), (Path.unlink, "cannot read")])
 def test_damage_is_named(tmp_path, damage, words):
     write_lpv_volume(tmp_path, field())
     damage(tmp_path / "lpv/lpv.json")

@@ -34,7 +34,7 @@ def sh_of(folder):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("technique", ["rsm", "lpv", "vpl"])
+@pytest.mark.parametrize("technique", ["rsm", "lpv", "vpl", "cone_tracing"])
 def test_both_devices_bake_the_same(gpu_device, tmp_path, technique):
     for device in ("cpu", "gpu"):
         code, err = bake(tmp_path / device, technique, device)

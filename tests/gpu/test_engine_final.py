@@ -84,6 +84,33 @@ def test_the_passes_add_up(scene, tmp_path):
     assert np.median(np.abs(found["DiffCol"] * found["Irradiance"] / np.pi - found["Indirect"])) < 1e-4
 
 
+def test_media_have_passes_of_their_own(scene, tmp_path):
+    import bpy
+    clear = render(scene, tmp_path, "clear")
+    bpy.ops.mesh.primitive_cube_add(size=1.2)
+    material = bpy.data.materials.new("Fog")
+    if material.node_tree is None:
+        material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    fog, output = tree.nodes.new("ShaderNodeVolumePrincipled"), tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(fog.outputs[0], output.inputs["Volume"])
+    bpy.context.object.data.materials.append(material)
+    layer = scene.view_layers[0].rtgi
+    layer.use_volume_direct = layer.use_volume_indirect = layer.use_transmittance = True
+    found = render(scene, tmp_path, "foggy")
+    names = ("Volume Direct", "Volume Indirect") if bpy.app.version >= (5, 0, 0) else ("VolumeDir", "VolumeInd")
+    direct, indirect, left = (found[name] for name in (*names, "Transmittance"))
+    assert 0.1 < left.min() < 0.9 and left.max() <= 1.0 and direct.max() > 0.005 and indirect.max() > 0.005
+    surfaces = found["Direct"] + found["Indirect"]
+    # Means of products are no products of means at edges, which there are few of.
+    assert np.median(np.abs(surfaces * left + direct + indirect - found["Combined"][..., :3])) < 2e-3
+    assert np.abs(found["Combined"] - clear["Combined"]).max() > 0.02
+    scene.rtgi_effects.use_effect_media = False
+    without = render(scene, tmp_path, "left out")
+    assert np.all(without["Transmittance"] == 1.0) and not without[names[0]].any()
+
+
 def test_the_geometry_is_that_of_the_scene(scene, tmp_path):
     import bpy
     found = render(scene, tmp_path)
@@ -98,13 +125,27 @@ def test_the_geometry_is_that_of_the_scene(scene, tmp_path):
     assert middle == pytest.approx((point - eye.translation).length, rel=0.05)
 
 
-@pytest.mark.parametrize("technique", ["rsm", "lpv"])
+def test_a_render_by_rays_needs_no_bake(scene, tmp_path):
+    scene.rtgi_preview.render_samples = 16
+    baked = render(scene, tmp_path)
+    preview = scene.rtgi_preview
+    preview.gather, preview.gather_error, preview.gather_samples = "rays", 0.05, 64
+    scene.rtgi.technique = "vpl"
+    found = render(scene, tmp_path, "rays")
+    assert set(found) == set(baked)
+    for name in ("Combined", "Direct", "Indirect", "Irradiance"):
+        assert found[name].mean() == pytest.approx(baked[name].mean(), rel=0.15), name
+    np.testing.assert_allclose(found["Depth"], baked["Depth"], rtol=0.01)
+
+
+@pytest.mark.parametrize("technique", ["rsm", "lpv", "voxel_march"])
 def test_techniques_that_need_no_bake_light_a_render_as_their_bake_does(scene, tmp_path, technique):
     """And with an object elsewhere than when it was baked."""
     import bpy
     block = bpy.data.objects["Cube.001"]
     scene.rtgi.technique = technique
     scene.rtgi.technique_rsm.resolution, scene.rtgi.technique_lpv.steps = 128, 32
+    scene.rtgi.technique_voxel_march.resolution = 24
     scene.rtgi_preview.render_samples = 8
 
     def indirect():
@@ -238,9 +279,9 @@ def test_the_same_picture_every_time(scene, tmp_path):
 def test_the_renderer_itself_gives_the_same_pixels(scene, tmp_path):
     from rtgi_addon.blender.engine.shown import shown_for
     from rtgi_addon.blender.extract import extract_scene
-    from rtgi_addon.blender.preview_settings import preview_settings
-    from rtgi_addon.preview.camera_view import CameraView
+    from rtgi_addon.blender.ui.preview_settings import preview_settings
     from rtgi_addon.preview.renderer import PreviewRenderer
+    from rtgi_addon.transport.views.camera import CameraView
     found = render(scene, tmp_path)
     extracted = extract_scene()
     renderer = PreviewRenderer(extracted, shown_for(scene).field, preview_settings(scene, final=True), ("combined",))

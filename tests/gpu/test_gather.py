@@ -9,7 +9,7 @@ from shadow_maps import prepared
 
 from rtgi_addon.techniques.rsm.gather import Pattern, gather
 from rtgi_addon.techniques.vpl.gather import gather_visible
-from rtgi_addon.transport.virtual_lights import VirtualLights
+from rtgi_addon.techniques.vpl.virtual_lights import VirtualLights
 
 TOLERANCE = 1e-5
 

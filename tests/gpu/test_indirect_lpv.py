@@ -10,7 +10,7 @@ import scene_builders as build
 from receivers import directions, drawn, points_in, relative_error, waited
 
 from rtgi_addon.progress import Progress
-from rtgi_addon.scene import World
+from rtgi_addon.scene import Medium, Phase, World
 from rtgi_addon.techniques.lpv import TECHNIQUE, LpvSettings
 from rtgi_addon.techniques.lpv.field import LpvField
 from rtgi_addon.techniques.lpv.grid import LpvGrid
@@ -29,8 +29,10 @@ def random_field(cascades, resolution=(8, 9, 10), **params):
     rng = np.random.default_rng(5)
     grids = tuple(LpvGrid(tuple(1.0 - 0.5 * 0.25 * 2**level * np.array(resolution)), 0.25 * 2**level, resolution)
                   for level in range(cascades))
-    return LpvField(grids, tuple(rng.normal(size=(4, 3, *resolution[::-1])).astype(np.float32) for _ in grids), params=params,
-                    stats={})
+    walls = tuple(np.concatenate([np.clip(rng.uniform(-0.5, 1.5, (3, *grid.shape)), 0, 1),
+                                  rng.uniform(-0.5, 0.5, (3, *grid.shape))]).astype(np.float32) for grid in grids)
+    return LpvField(grids, tuple(rng.normal(size=(4, 3, *resolution[::-1])).astype(np.float32) for _ in grids), walls,
+                    params=params, stats={})
 
 
 @pytest.mark.parametrize("dampening", [True, False])
@@ -126,6 +128,19 @@ def test_volumes_need_no_bake(indirect):
     after = moved(ROOMS, 0.3)
     assert made.capture(drawn(after)) and waited(made) and made.error is None
     assert relative_error(made, bake(after), points, normals).max() < 0.005
+    made.close()
+
+
+def test_volumes_follow_media(indirect):
+    fog = replace(ROOMS, media=(Medium("fog", np.full(3, 0.3), np.array([0.1, 0.4, 0.8]), phase=Phase(anisotropy=0.4)),))
+    field, points, normals = bake(fog), points_in((1.9, 0.9, 0.9), 500), directions(500)
+    assert field.irradiance(points, normals).mean() < 0.8 * bake(ROOMS).irradiance(points, normals).mean()
+    made, lamp = indirect.make_indirect(field, fog), moved(fog, 0.2)
+    assert made.capture(drawn(lamp)) and not made.busy
+    assert relative_error(made, bake(lamp), points, normals).max() < 0.005
+    # Without its media a scene has other volumes.
+    assert made.capture(drawn(ROOMS)) and made.busy and waited(made)
+    assert relative_error(made, bake(ROOMS), points, normals).max() < 0.005
     made.close()
 
 

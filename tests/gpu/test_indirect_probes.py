@@ -8,12 +8,13 @@ import room_scenes as rooms
 import scene_builders as build
 from probe_bakes import QUICK, bake
 from receivers import directions, error, points_in, relative_error, waited
+from scattered_rooms import scattered, storeys
 
 from rtgi_addon.scene import ProbeVolume
-from rtgi_addon.techniques.probes.field import ProbeField
-from rtgi_addon.techniques.probes.lookup import LookupSettings
+from rtgi_addon.techniques.lattice.field import ProbeField
+from rtgi_addon.techniques.lattice.lookup import LookupSettings
 
-# Float sums in another order; where a stored variance is what cancellation leaves, Chebyshev's weight has fewer digits.
+# Float sums in another order; where a stored variance is what cancellation leaves, the share that is seen has fewer digits.
 TYPICAL, WORST = 2e-6, 1e-4
 
 
@@ -55,6 +56,14 @@ def test_every_way_of_reading(indirect, box, lookup):
 def test_every_order(indirect, order):
     field = bake(build.closed_box(albedo=0.6, light_position=(0.6, -0.3, 0.4), resolution=(2, 2, 2)), order=order, **QUICK)
     assert agrees(indirect, field, *receivers_in(1.0))
+
+
+@pytest.mark.parametrize("lookup", [LookupSettings(), LookupSettings(reconstruction="zh3"), LookupSettings(visibility=False)],
+                         ids=str)
+def test_scattered_probes_alone_and_beside_a_lattice(indirect, box, lookup):
+    grids = bake(scattered(storeys()), **QUICK).grids()
+    for field in (ProbeField(grids, lookup=lookup), ProbeField((*grids, *box.grids()), lookup=lookup)):
+        assert agrees(indirect, field, *receivers_in(2.6))
 
 
 def test_rooms_that_do_not_see_each_other_and_dead_probes(indirect):

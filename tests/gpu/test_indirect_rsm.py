@@ -9,7 +9,7 @@ import scene_builders as build
 from receivers import directions, drawn, points_in, relative_error, waited
 
 from rtgi_addon.progress import Progress
-from rtgi_addon.scene import AreaLight, Instance, SpotLight, SunLight
+from rtgi_addon.scene import AreaLight, Instance, Medium, SpotLight, SunLight
 from rtgi_addon.techniques.rsm import TECHNIQUE, RsmSettings
 
 # Float sums in another order. A sample on the border of two texels may fall either way: one of some hundred, in few receivers.
@@ -101,6 +101,25 @@ def test_moved_lamps_are_captured_on_the_gpu(indirect, lights):
     found = irradiance(made, points, normals)
     assert found.mean(axis=0) == pytest.approx(expected.mean(axis=0), rel=2e-3)
     assert np.sqrt(np.mean((found - expected) ** 2)) < 0.05 * expected.mean()
+
+
+FOG = Medium("fog", np.full(3, 0.1), np.array([0.2, 0.4, 0.8]))
+
+
+def test_media_take_of_the_light_between_maps_and_receivers(indirect):
+    scene = replace(BOX, media=(FOG,))
+    field, clear = bake(scene), bake(BOX)
+    points, normals = points_in(0.95, 2000), directions(2000)
+    made = indirect.make_indirect(field, scene)
+    found = relative_error(made, field, points, normals)
+    assert np.quantile(found, 0.98) < TYPICAL and found.max() < WORST
+    assert field.irradiance(points, normals).mean() < 0.7 * clear.irradiance(points, normals).mean()
+    # Captured, as live maps are, they come and go with the scene.
+    from rtgi_addon.preview.indirect.base import irradiance
+    for shown, expected in ((scene, field), (BOX, clear), (scene, field)):
+        assert made.capture(drawn(shown)) and made.error is None
+        assert irradiance(made, points, normals).mean(axis=0) == pytest.approx(expected.irradiance(points, normals).mean(axis=0),
+                                                                               rel=0.01)
 
 
 def test_lamps_that_light_nothing_are_dark(indirect):

@@ -1,5 +1,7 @@
 """Light propagation volumes on the GPU against numpy. Sums of some hundred floats: relative to the largest coefficient."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -60,6 +62,14 @@ def test_propagation_among_blockers(gpu_device, bounces):
     assert not agrees(expected, propagate(coefficients, vacuum(GRID), 12), 0.05)
 
 
+def test_propagation_in_media(gpu_device):
+    kept = np.random.default_rng(5).random((2, 3, GRID.count), np.float32)
+    blocking, coefficients = replace(vacuum(GRID), kept=kept), inject(GRID, *lights(seed=4))
+    expected = propagate(coefficients, blocking, 12)
+    assert agrees(gpu_device.lpv_propagate(coefficients, blocking, 12), expected)
+    assert not agrees(expected, propagate(coefficients, vacuum(GRID), 12), 0.05)
+
+
 def test_flux_is_kept_in_vacuum(gpu_device):
     grid = LpvGrid((0.0, 0.0, 0.0), 1.0, (9, 9, 9))
     coefficients = inject(grid, np.float32([[4.2, 4.6, 4.4]]), np.float32([[0, 0.6, 0.8]]), np.float32([[1, 2, 3]]))
@@ -75,6 +85,18 @@ def test_cancel_is_felt_between_steps(gpu_device):
         gpu_device.lpv_propagate(GRID.empty(), vacuum(GRID), 4, progress=progress)
 
 
+def walls(grid, seed=6):
+    """Faces of which some are closed, in part or whole, and are crossed anywhere."""
+    rng = np.random.default_rng(seed)
+    let_through = np.clip(rng.uniform(-0.5, 1.5, (3, *grid.shape)), 0, 1)
+    return np.concatenate([let_through, rng.uniform(-0.5, 0.5, (3, *grid.shape))]).astype(np.float32)
+
+
+def test_injection_among_walls(gpu_device):
+    found, expected = (inject(GRID, *lights(seed=8), walls(GRID)) for inject in (gpu_device.lpv_inject, inject))
+    assert agrees(found, expected) and not agrees(expected, inject(GRID, *lights(seed=8)), 0.1)
+
+
 @pytest.mark.parametrize("dampening", [True, False])
 def test_gather_from_cascades(gpu_device, dampening):
     rng = np.random.default_rng(5)
@@ -82,9 +104,10 @@ def test_gather_from_cascades(gpu_device, dampening):
     volumes = tuple(rng.normal(size=(4, 3, 10, 9, 8)).astype(np.float32) for _ in grids)
     points = (rng.random((5000, 3)) * 5.5 - 1.5).astype(np.float32)
     normals = lights(5000)[1]
-    expected = gather(grids, volumes, points, normals, dampening)
-    assert expected.any()
-    assert agrees(gpu_device.lpv_gather(grids, volumes, points, normals, dampening), expected, 1e-5)
+    for faces in (None, tuple(walls(grid) for grid in grids)):
+        expected = gather(grids, volumes, points, normals, dampening, faces)
+        assert expected.any()
+        assert agrees(gpu_device.lpv_gather(grids, volumes, points, normals, dampening, faces), expected, 1e-5)
 
 
 def test_gather_at_no_point(gpu_device):

@@ -7,10 +7,23 @@ import pytest
 import scene_builders as build
 from probe_bakes import QUICK, bake
 
+from rtgi_addon.effects.spheres.maps import SphereMap, SphereProbes
+from rtgi_addon.effects.spheres.prefilter import prefiltered
 from rtgi_addon.numerics import grid as lattice
-from rtgi_addon.numerics import sh
-from rtgi_addon.preview.overlay_shapes import MOVED, PROBE_RADIUS, UNUSABLE, USABLE, Discs, box_lines, state_colors
+from rtgi_addon.numerics import octahedral, sh
+from rtgi_addon.preview.overlay_shapes import (
+    MOVED,
+    PROBE_RADIUS,
+    UNUSABLE,
+    USABLE,
+    Discs,
+    box_lines,
+    mirror_rows,
+    state_colors,
+)
+from rtgi_addon.preview.overlay_voxels import voxel_rows
 from rtgi_addon.preview.settings import OverlaySettings
+from rtgi_addon.scene.sphere_probe import BOX, SphereProbe
 
 SIZE = 48, 32
 
@@ -24,13 +37,16 @@ def field():
     return bake(room(), **QUICK)
 
 
-def eye(distance=3.0):
+def eye(distance=3.0, orthographic=False):
     """Looks along +Y at the origin."""
-    from rtgi_addon.preview.camera_view import CameraView
+    from rtgi_addon.transport.views.camera import CameraView
     pose = np.eye(4)
     pose[:3, :3] = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
     pose[:3, 3] = 0, -distance, 0
     near, far = 0.1, 50.0
+    if orthographic:
+        return CameraView(pose, np.array([[0.4 * SIZE[1] / SIZE[0], 0, 0, 0], [0, 0.4, 0, 0],
+                                          [0, 0, -2 / (far - near), -(far + near) / (far - near)], [0, 0, 0, 1]]))
     return CameraView(pose, np.array([[1.2 * SIZE[1] / SIZE[0], 0, 0, 0], [0, 1.2, 0, 0],
                                       [0, 0, -(far + near) / (far - near), -2 * far * near / (far - near)], [0, 0, -1, 0]]))
 
@@ -50,6 +66,45 @@ def pixel(point):
     """Column and row (from the bottom) in which a world point is seen."""
     clip = eye().drawn(SIZE).clip_from_world @ [*point, 1.0]
     return tuple(np.floor((clip[:2] / clip[3] * 0.5 + 0.5) * SIZE).astype(int))
+
+
+def met(centre, radius, view):
+    """Of rays through the middles of the overlay's own texels, four a pixel: which (n,) meet a sphere, their directions and the
+    sphere's normals there (m, 3)."""
+    x, y = np.meshgrid(*((np.arange(2 * side) + 0.5) / (2 * side) for side in SIZE))
+    origins, directions, _ = view.through(x.ravel(), y.ravel())
+    to_centre = centre - origins
+    along = np.sum(directions * to_centre, axis=1)
+    half = radius**2 - (np.square(to_centre).sum(axis=1) - along**2)
+    hits = half > 0
+    normals = ((along - np.sqrt(np.maximum(half, 0.0)))[:, None] * directions - to_centre)[hits] / radius
+    return hits, directions[hits], normals
+
+
+@pytest.mark.parametrize("orthographic", [False, True])
+def test_sphere_probes_are_mirror_balls(gpu_device, orthographic):
+    from rtgi_addon.preview.gbuffer import GBuffer
+    from rtgi_addon.preview.overlays import Overlays, laid_over
+    directions = octahedral.texel_directions(32).astype(np.float64)
+    seen = [1.0 + 0.5 * directions, 0.2 + np.square(directions)]
+    levels = [prefiltered(values.reshape(1, 32, 32, 3)) for values in seen]
+    spheres = SphereProbes([SphereMap(SphereProbe(f"probe {number}", build.transform((2.0 * number - 1.0, 0.3, 0.1)), BOX, 1.0),
+                                      tuple(level[0].astype(np.float16) for level in of)) for number, of in enumerate(levels)])
+    view, gbuffer = eye(orthographic=orthographic), GBuffer(*SIZE)
+    gbuffer.draw(None, view.drawn(SIZE))
+    overlays = Overlays(OverlaySettings(probes="light", probe_size=5.0), spheres=spheres)
+    picture = laid_over(np.zeros((*SIZE[::-1], 4), np.float32), overlays.draw(view, SIZE, gbuffer.textures))
+    expected = np.zeros((4 * SIZE[0] * SIZE[1], 4))
+    for number, (*centre, radius) in enumerate(mirror_rows(spheres, 5.0)):
+        hits, along, normals = met(np.array(centre), radius, view)
+        mirrored = along - 2.0 * np.sum(along * normals, axis=1, keepdims=True) * normals
+        expected[hits, :3], expected[hits, 3] = spheres.seen(number, mirrored), 1.0
+    expected = expected.reshape(SIZE[1], 2, SIZE[0], 2, 4).mean(axis=(1, 3))
+    whole = (expected[..., 3] == 1.0) & (picture[..., 3] == 1.0)
+    assert np.count_nonzero(whole) > 40 and np.ptp(expected[whole]) > 0.5
+    np.testing.assert_allclose(picture[whole], expected[whole], atol=0.06)
+    assert np.abs(picture[whole] - expected[whole]).mean() < 0.01
+    assert Overlays(OverlaySettings(probes="validity"), spheres=spheres).is_empty
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -146,3 +201,36 @@ def test_an_image_under_an_overlay(gpu_device, field):
     result = laid_over(np.ones((2, 3, 4), np.float32), upload(over))
     np.testing.assert_allclose(result[0, 0], [0.75, 0.5, 0.5, 1.0])
     np.testing.assert_allclose(result[1], 1.0)
+
+
+@pytest.mark.parametrize("what", ["light", "opacity"])
+@pytest.mark.parametrize("level", [0, 2])
+def test_voxels_are_cubes_that_show_what_their_faces_do(gpu_device, what, level):
+    from rtgi_addon import techniques
+    from rtgi_addon.progress import Progress
+    scene = room()
+    settings = techniques.get("cone_tracing").Settings(resolution=12, light="voxels", bounces=0)
+    field = techniques.get("cone_tracing").bake(scene, settings, np.random.default_rng(0), Progress())
+    rows = voxel_rows(field.hierarchy, level, what)
+    picture = drawn(OverlaySettings(voxels=what, voxel_level=level), voxels=field.hierarchy)
+    # By numpy: the nearest face that rays through the middles of the overlay's own texels meet.
+    x, y = np.meshgrid(*((np.arange(2 * side) + 0.5) / (2 * side) for side in SIZE))
+    origins, along, _ = eye().through(x.ravel(), y.ravel())
+    nearest, expected = np.full(len(along), np.inf), np.zeros((len(along), 4), np.float32)
+    for row in rows.astype(np.float64):
+        for face in range(6):
+            axis, end = face // 2, 2 * (face % 2) - 1
+            t = (row[axis] + end * row[3] - origins[:, axis]) / along[:, axis]
+            place = origins + along * t[:, None] - row[:3]
+            across = np.delete(place, axis, axis=1)
+            met = (np.abs(across) < row[3]).all(axis=1) & (t > 0) & (t < nearest) & (row[7 + 4 * face] > 0)
+            nearest[met] = t[met]
+            expected[met] = row[4 + 4 * face:8 + 4 * face]
+    expected = expected.reshape(SIZE[1], 2, SIZE[0], 2, 4).mean(axis=(1, 3))
+    assert np.mean(expected[..., 3] > 0) > 0.1 and np.ptp(expected[expected[..., 3] == 1, 0]) > (0.01 if what == "light" else -1)
+    assert np.mean(np.abs(picture - expected).max(axis=-1) > 1e-3 * expected[..., :3].max()) < 0.03
+
+
+def test_voxels_are_those_of_a_technique_that_has_them(gpu_device, field):
+    from rtgi_addon.preview.overlays import Overlays
+    assert Overlays(OverlaySettings(voxels="light"), grids=field.grids()).is_empty

@@ -9,7 +9,7 @@ import scene_builders as build
 from rtgi_addon.progress import Progress
 from rtgi_addon.scene import Material, PointLight, World
 from rtgi_addon.transport.context import LightContext
-from rtgi_addon.transport.environment import Environment
+from rtgi_addon.transport.lights.environment import Environment
 
 LAMP = PointLight("lamp", np.float32([-0.9, 0.3, 2.2]), np.float32([3, 2, 1]))
 SIZE = 24, 16
@@ -17,7 +17,7 @@ SIZE = 24, 16
 
 def view(orthographic=False, size=SIZE):
     """From above the front edge."""
-    from rtgi_addon.preview.camera_view import CameraView
+    from rtgi_addon.transport.views.camera import CameraView
     back = np.array([0.0, -0.87, 0.5]) / np.linalg.norm([0.87, 0.5])
     right = np.array([1.0, 0.0, 0.0])
     pose = np.eye(4)
@@ -96,7 +96,7 @@ def test_depth_and_normals_are_those_of_rays(gpu_device, orthographic):
     same = (hits.primitive >= 0) == (result.image("object")[..., 0].ravel() > 0)
     assert same.mean() > 0.98
     both = same & (hits.primitive >= 0)
-    points = context.geometry.points(hits.primitive, hits.u, hits.v)
+    points = context.geometry.points(np.maximum(hits.primitive, 0), hits.u, hits.v)
     depth = (points - pose[:3, 3]) @ -pose[:3, 2]
     off = np.abs(result.image("depth")[..., 0].ravel() - depth)[both] > 1e-3
     assert off.mean() < 0.02
@@ -152,6 +152,28 @@ def test_lamps_that_the_bake_holds_are_not_added_again(gpu_device):
         result.close()
     assert light[False]["direct"].max() > 0.1 and not light[True]["direct"].any()
     assert light[True]["irradiance"].mean() > 1.5 * light[False]["irradiance"].mean()
+
+
+def test_of_several_lamps_those_are_added_that_the_bake_lacks(gpu_device):
+    """One is in it as a whole, one by its bounces, and one that no bake knows shines all the same."""
+    from rtgi_addon import techniques
+    from rtgi_addon.preview.renderer import PreviewRenderer
+    from rtgi_addon.scene.lights import ALL_LIGHT, NOT_AT_ALL
+    scene = stage(0.0, volumes=(build.volume("room", half_size=(1.5, 1.5, 1.0), center=(0.0, 0.0, 1.0)),))
+    roles = {"whole": ALL_LIGHT, "bounces": "BOUNCES", "none": NOT_AT_ALL}
+    lamps = tuple(replace(build.point_light((x, 0.3, 2.0), 1.0, name), bake=role)
+                  for x, (name, role) in zip((-0.8, 0.0, 0.8), roles.items(), strict=True))
+    scene = replace(scene, lights=lamps)
+    method = techniques.get("probes")
+    field = method.bake(scene, method.Settings(rays=64), np.random.default_rng(1), Progress())
+    pictures = []
+    for shown, light in ((scene, field), (replace(scene, lights=lamps[1:]), None)):
+        result = PreviewRenderer(shown, light, passes=("direct",))
+        result.frame(view(), SIZE)
+        pictures.append(result.image("direct")[..., :3])
+        result.close()
+    assert pictures[1].max() > 0.1
+    np.testing.assert_allclose(pictures[0], pictures[1], atol=1e-3 * pictures[1].max())
 
 
 def test_another_view_size_or_scale_begins_anew(gpu_device):

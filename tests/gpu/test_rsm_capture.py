@@ -2,15 +2,28 @@
 
 from dataclasses import replace
 
+import lamp_profiles
 import numpy as np
 import pytest
 import scene_builders as build
 from room_scenes import quad
 
-from rtgi_addon.scene import AreaLight, Channel, Instance, Material, PointLight, SpotLight, SunLight, Texture
+from rtgi_addon.scene import (
+    AreaLight,
+    Channel,
+    ClosedMesh,
+    Instance,
+    Linking,
+    Material,
+    Medium,
+    PointLight,
+    SpotLight,
+    SunLight,
+    Texture,
+)
 from rtgi_addon.transport.context import LightContext
-from rtgi_addon.transport.reflective_shadow_map import capture
-from rtgi_addon.transport.shadow_views import views_of
+from rtgi_addon.transport.views.reflective_shadow_map import capture
+from rtgi_addon.transport.views.shadow_views import views_of
 
 # Of the scene's extent, of a unit vector, of the largest flux; at grazing angles a float of a texel's place is many of a point's.
 POSITION, NORMAL, FLUX = 1e-5, 1e-4, 1e-4
@@ -26,6 +39,15 @@ LAMPS = {
     "area": AreaLight("area", np.float32([0.03, 0.017, 2.8]), np.float32([0.4, 0, 0]), np.float32([0, 0.3, 0]), DOWN,
                       np.float32([3, 2, 1])),
 }
+# Lamps with nodes: the distance to what is lit is known to the shader only.
+LAMPS["fading gobo"] = replace(LAMPS["spot"], profile=replace(lamp_profiles.by_direction(LAMPS["spot"], 0.7),
+                                                              by_distance=lamp_profiles.linear().by_distance))
+LAMPS["fading beam"] = replace(LAMPS["area"], spread=0.0, profile=replace(lamp_profiles.by_place(),
+                                                                          by_distance=lamp_profiles.linear().by_distance))
+
+
+SMOKE = Medium("smoke", np.float64([0.1, 0.2, 0.3]), np.full(3, 0.2), bounds=ClosedMesh(
+    build.cube().vertices_local, build.cube().triangles, build.transform((0.1, 0.0, 1.4), (1.5, 1.4, 0.6))))
 
 
 def texture(channels=4, extension="REPEAT", interpolation="Linear", srgb=True, dtype=np.uint8, seed=0):
@@ -76,6 +98,28 @@ def room(**replaced):
 @pytest.mark.parametrize("lamp", LAMPS)
 def test_instances_and_smooth_normals_agree_for_every_lamp(gpu_device, lamp):
     assert compare(gpu_device, room(lights=(LAMPS[lamp],))) > 1000
+
+
+ROLES = {  # fields of the ball, and of the lamp
+    "ball casts no shadow": ({"visible_shadow": False}, {}),
+    "no ray meets the ball": ({f"visible_{kind}": False for kind in ("camera", "diffuse", "shadow")}, {"casts_shadow": False}),
+    "ball is not lit": ({}, {"linking": Linking(receivers=np.arange(5) != 1)}),
+    "boxes are not in the way": ({}, {"linking": Linking(blockers=np.arange(5) < 2)}),
+    "ball moves in the game": ({"bake": "DYNAMIC"}, {}),
+}
+
+
+@pytest.mark.parametrize("name", ROLES)
+def test_maps_show_what_light_meets(gpu_device, name):
+    ball, lamp = ROLES[name]
+    scene = room(lights=(replace(LAMPS["spot"], **lamp),))
+    instances = list(scene.instances)
+    instances[1] = replace(instances[1], **ball)
+    scene = replace(scene, instances=tuple(instances))
+    assert compare(gpu_device, scene) > 1000
+    plain, changed = (LightContext(shown, 1) for shown in (room(lights=(LAMPS["spot"],)), scene))
+    view = views_of(plain, 0, 64)[0]
+    assert np.mean(np.any(capture(plain, view).flux != capture(changed, view).flux, axis=-1)) > 0.01
 
 
 @pytest.mark.parametrize("extension", ["REPEAT", "EXTEND", "CLIP", "MIRROR"])
@@ -145,6 +189,18 @@ def test_a_triangle_beyond_16_bits_keeps_its_number(gpu_device):
     assert len(triangles) > 2 * 65536
     scene = build.scene([build.mesh("grid", vertices, triangles)], lights=[LAMPS["spot"]])
     assert compare(gpu_device, scene, edges=0.06) > 500
+
+
+@pytest.mark.parametrize("lamp", LAMPS)
+def test_media_take_of_the_light_on_its_way(gpu_device, lamp):
+    scene = replace(room(lights=(LAMPS[lamp],)), media=(SMOKE,))
+    assert compare(gpu_device, scene) > 1000
+    view = views_of(LightContext(scene, 1), 0, 96)[0]
+    thick, clear = (capture(LightContext(one, 1), view).flux.sum() for one in (scene, replace(scene, media=())))
+    assert 0 < thick < 0.95 * clear
+    # A lamp that casts no shadow is not shadowed by them either.
+    bright = replace(scene, lights=(replace(LAMPS[lamp], casts_shadow=False),))
+    assert compare(gpu_device, bright) > 1000
 
 
 def test_relit_contexts_share_their_surfaces(gpu_device):

@@ -63,7 +63,7 @@ def drawn(viewport=None):
         live.read(depsgraph)
     projection = camera.calc_matrix_camera(depsgraph, x=SIZE[0], y=SIZE[1])
     view = SimpleNamespace(view_matrix=camera.matrix_world.inverted(), window_matrix=projection)
-    context = SimpleNamespace(region=SimpleNamespace(width=SIZE[0], height=SIZE[1]), region_data=view)
+    context = SimpleNamespace(region=SimpleNamespace(width=SIZE[0], height=SIZE[1]), region_data=view, space_data=None)
     engine, target, viewport = Engine(), RenderTarget(*SIZE, ("RGBA32F",)), viewport or Viewport()
     with target.drawing():
         viewport.draw(engine, context, depsgraph)
@@ -106,7 +106,7 @@ def test_a_viewport_follows_the_switches(scene):
     np.testing.assert_allclose(again, plain, atol=1e-5)
 
 
-@pytest.mark.parametrize("technique", ["rsm", "lpv"])
+@pytest.mark.parametrize("technique", ["rsm", "lpv", "cone_tracing"])
 def test_techniques_that_need_no_bake_follow_objects(scene, technique):
     import bpy
 
@@ -117,6 +117,7 @@ def test_techniques_that_need_no_bake_follow_objects(scene, technique):
     scene.rtgi.technique, scene.rtgi_preview.mode = technique, "indirect"
     scene.rtgi_preview.samples = 4
     scene.rtgi.technique_rsm.resolution, scene.rtgi.technique_lpv.steps = 64, 32
+    scene.rtgi.technique_cone_tracing.resolution, scene.rtgi.technique_cone_tracing.light = 16, "voxels"
     viewport, live = Viewport(), live_scene(bpy.context.evaluated_depsgraph_get())
     live.wants_all = True
     live.read(bpy.context.evaluated_depsgraph_get())
@@ -126,6 +127,7 @@ def test_techniques_that_need_no_bake_follow_objects(scene, technique):
         image, stats = drawn(viewport)
         while viewport.unsettled and time.monotonic() < until:
             image, stats = drawn(viewport)
+        assert not viewport.unsettled and not viewport.picture.renderer.error
         return image[..., :3], stats
 
     before, stats = settled()
@@ -141,6 +143,64 @@ def test_techniques_that_need_no_bake_follow_objects(scene, technique):
     assert np.abs(before - fresh).mean() > 0.03 * fresh.mean()
     np.testing.assert_allclose(after, fresh, rtol=1e-3, atol=1e-3 * fresh.max())
     viewport.close()
+
+
+def settled(viewport, seconds=120):
+    """What is drawn once nothing more is made."""
+    until = time.monotonic() + seconds
+    image, stats = drawn(viewport)
+    while viewport.unsettled and time.monotonic() < until:
+        image, stats = drawn(viewport)
+    assert not viewport.unsettled
+    return image[..., :3], stats
+
+
+def test_live_probes_follow_lamps_and_objects_and_take_the_place_of_a_bake(scene):
+    import bpy
+
+    from rtgi_addon.blender.engine.live import live_scene
+    from rtgi_addon.blender.engine.viewport import Viewport
+    from rtgi_addon.blender.extract.refresh import refresh_scene
+    bpy.ops.mesh.primitive_cube_add(size=1.2, location=(-1.2, 1.2, -1.4))
+    scene.rtgi_preview.mode, scene.rtgi_preview.live_probes, scene.rtgi_preview.live_hysteresis = "indirect", True, 0.5
+    viewport, live = Viewport(), live_scene(bpy.context.evaluated_depsgraph_get())
+    live.wants_all = True
+    live.read(bpy.context.evaluated_depsgraph_get())
+    before, stats = settled(viewport)
+    assert "Live, without a bake" in stats and "out of date" not in stats and np.median(before) > 0
+    bpy.data.objects["Cube.001"].location.x = 1.2
+    bpy.data.objects["Point"].data.energy = 300
+    live.scene = refresh_scene(live.scene, bpy.context.evaluated_depsgraph_get())
+    after, _ = settled(viewport)
+    viewport.close()
+    fresh, _ = settled(viewport)
+    assert np.abs(before - fresh).mean() > 0.3 * fresh.mean()
+    assert np.abs(after - fresh).mean() < 0.06 * fresh.mean()
+    # Spheres in the light of now, and the bake again.
+    scene.rtgi_preview.probes = "light"
+    spheres, _ = settled(viewport)
+    assert np.abs(spheres - fresh).mean() > 0.01 * fresh.mean()
+    scene.rtgi_preview.probes, scene.rtgi_preview.live_probes = "none", False
+    baked, stats = settled(viewport)
+    assert "Live" not in stats and np.abs(baked - fresh).mean() > 0.05 * fresh.mean()
+    viewport.close()
+
+
+def test_a_render_in_the_place_of_live_probes_is_baked_for_its_frame(scene, tmp_path):
+    import bpy
+
+    from rtgi_addon.blender.engine.shown import lit_for, shown_for
+    from rtgi_addon.blender.extract import extract_scene
+    from rtgi_addon.progress import Progress
+    scene.rtgi_preview.live_probes = True
+    shown = shown_for(scene)
+    assert shown.field is None and shown.live.rays == scene.rtgi_preview.live_rays and shown.live.probes.rays == 64
+    bpy.data.objects["Point"].data.energy = 300
+    read = extract_scene(bpy.context.evaluated_depsgraph_get())
+    field = lit_for(shown, read, Progress())
+    scene.rtgi_preview.live_probes = False
+    baked = shown_for(scene).field
+    assert field.grids()[0].sh[..., 0, :].mean() > 2.0 * baked.grids()[0].sh[..., 0, :].mean()
 
 
 def test_what_is_shown_changes_without_reading_the_scene_again(scene):

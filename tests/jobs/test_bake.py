@@ -13,6 +13,7 @@ from rtgi_addon.exchange.bundle import read_bundle
 from rtgi_addon.jobs.bake import bake_scene
 from rtgi_addon.jobs.fingerprint import fingerprint
 from rtgi_addon.progress import Progress
+from rtgi_addon.scene import Omission
 
 
 @pytest.fixture(autouse=True)
@@ -49,12 +50,24 @@ def test_a_bake_ends_in_a_bundle_and_a_summary(tmp_path, scene):
     bundle = read_bundle(tmp_path / "out")
     assert [grid.volume.name for grid in bundle.grids] == ["A", "B"] and bundle.grids[0].order == 2
     assert bundle.manifest["seed"] == 4 and bundle.manifest["settings"]["order"] == 2 and bundle.manifest["includes_direct"]
-    assert bundle.manifest["notes"] == ["read with care"]
+    outside, = summary.warnings  # two small volumes in a room
+    assert bundle.manifest["notes"] == ["read with care", outside] and "outside every probe volume" in outside
     assert bundle.manifest["stats"]["rays"] == summary.rays == 7 * (60 + 12)
     assert {"check", "bake", "write"} <= summary.seconds.keys() and summary.peak_memory_bytes > 2**20
     assert [(v.name, v.probes, v.usable) for v in summary.volumes] == [("A", 60, 60), ("B", 12, 12)]
     assert summary.out == tmp_path / "out" and not summary.resumed
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def test_what_is_not_followed_is_in_bundle_and_summary_with_how_much_it_concerns(tmp_path, scene):
+    hair = Omission("fur is hair: it is left out", ("fur",), boxes_world=np.array([[[-0.9, -0.9, -0.9], [0.9, 0.9, -0.8]]]))
+    summary = bake(replace(scene, omissions=(hair, Omission("lamp shines elsewhere", ("nothing",)))), tmp_path / "out")
+    unknown, fur = summary.not_followed
+    assert unknown.share is None and fur.omission is hair and 0.05 < fur.share < 0.4
+    assert f"omitted  fur is hair: it is left out (concerns {100 * fur.share:.2g} % of the light at the probes, estimated)" in \
+        summary.to_text()
+    stored = read_bundle(tmp_path / "out").manifest["not_followed"]
+    assert stored == [unknown.to_json(), fur.to_json()] and summary.to_json()["not_followed"] == stored
 
 
 def test_the_seed_decides_the_bytes_and_the_threads_do_not(tmp_path, scene):

@@ -2,7 +2,9 @@
 amount in a furnace of a known answer stands in for the real ones."""
 
 import json
+import os
 import sys
+from functools import partial
 
 import numpy as np
 import pytest
@@ -12,10 +14,19 @@ from offset_technique import OffsetTechnique
 from rtgi_addon import techniques
 from rtgi_addon.errors import BakeError, Cancelled, UsageError
 from rtgi_addon.evaluate import chart_picture
+from rtgi_addon.evaluate.error_map import ErrorMap
+from rtgi_addon.jobs import chart as chart_job
 from rtgi_addon.jobs.chart import chart_scene
 from rtgi_addon.progress import Progress
+from rtgi_addon.storage.png import require_whole_png
 
 QUICK = {"points": 8, "normals_per_point": 2, "probes": 4, "noise": 0.04, "threads": 1}
+
+
+@pytest.fixture(autouse=True)
+def small_maps(monkeypatch):
+    """Error maps of a few pixels: most of a chart's time would be their reference."""
+    monkeypatch.setattr(chart_job, "ErrorMap", partial(ErrorMap, size=(16, 9)))
 
 
 @pytest.fixture
@@ -71,11 +82,12 @@ def test_the_files_hold_what_was_measured(furnace, offset, tmp_path):
     assert "offset, offset 0.02, noise 0.01" in report.to_text() and report.to_json()["out"] == str(tmp_path / "chart")
 
 
-def test_without_matplotlib_everything_else_comes_and_one_line_says_so(furnace, offset, tmp_path, monkeypatch):
+def test_without_matplotlib_the_chart_is_plain_and_one_line_says_so(furnace, offset, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     assert not chart_picture.can_draw()
     report = chart_scene(furnace, tmp_path / "chart", ["offset"], seeds=1, **QUICK)
-    assert set(report.files) == {"chart.json", "chart.md", "error_offset.png", "reference.png"} and report.picture is None
+    assert set(report.files) == {"chart.json", "chart.md", "chart.png", "error_offset.png", "reference.png"}
+    require_whole_png(report.picture, (800, 1280))
     assert [line for line in report.to_text().splitlines() if "pip install matplotlib" in line] == [f"  note     {report.hint}"]
     assert "error_offset.png" in (tmp_path / "chart/chart.md").read_text()
 
@@ -90,6 +102,81 @@ def test_a_cancelled_chart_keeps_what_was_measured(furnace, offset, tmp_path):
     assert "Cancelled before the end" in (tmp_path / "chart/chart.md").read_text()
     if chart_picture.can_draw():
         assert (tmp_path / "chart/chart.png").exists()
+
+
+def assert_same_figures(found, expected):
+    """All but what the clock decides."""
+    def figures(chart):
+        return [(point.label, point.lattice, point.settings, point.rays, point.accuracy, point.field_bytes,
+                 [run["errors"] for run in point.runs]) for point in chart.points]
+
+    assert figures(found) == figures(expected) and (found.reference, found.receivers) == (expected.reference, expected.receivers)
+
+
+def test_an_interrupted_chart_goes_on_where_it_stopped(furnace, offset, tmp_path):
+    whole = chart_scene(furnace, tmp_path / "whole", ["offset"], seeds=2, **QUICK)
+    bakes = len(offset.bakes)
+    for stop in (3, 6):
+        offset.bakes.clear()
+        progress = Progress()
+        offset.on_bake = lambda number, stop=stop, progress=progress: number == stop and progress.cancel()
+        with pytest.raises(Cancelled, match="--resume goes on from there"):
+            chart_scene(furnace, tmp_path / "chart", ["offset"], seeds=2, resume=True, progress=progress, **QUICK)
+    offset.bakes.clear()
+    offset.on_bake = lambda number: None
+    with pytest.raises(BakeError, match=r"belongs to another run, changed since: seeds \(2 before, 3 now\)"):
+        chart_scene(furnace, tmp_path / "chart", ["offset"], seeds=3, resume=True, **QUICK)
+    report = chart_scene(furnace, tmp_path / "chart", ["offset"], seeds=2, resume=True, **QUICK)
+    # One to warm up, and the defaults once more for their map; what was measured is not baked again.
+    assert 0 < len(offset.bakes) < bakes and report.chart.complete and report.files == whole.files
+    assert_same_figures(report.chart, whole.chart)
+    assert (tmp_path / "chart/error_offset.png").read_bytes() == (tmp_path / "whole/error_offset.png").read_bytes()
+    assert sorted(os.listdir(tmp_path)) == ["chart", "whole"]
+
+
+def test_a_refusal_is_remembered(furnace, offset, tmp_path, monkeypatch):
+    refuses = type("Refuses", (OffsetTechnique,), {"name": "refuses"})(refuses=True)
+    monkeypatch.setitem(techniques.registry(), "refuses", refuses)
+    progress = Progress()
+    offset.on_bake = lambda number: number == 3 and progress.cancel()
+    with pytest.raises(Cancelled):
+        chart_scene(furnace, tmp_path / "chart", ["refuses", "offset"], seeds=1, maps=False, progress=progress, **QUICK)
+    refuses.refuses, offset.on_bake = False, lambda number: None
+    report = chart_scene(furnace, tmp_path / "chart", ["refuses", "offset"], seeds=1, maps=False, resume=True, **QUICK)
+    assert len(report.chart.left_out) == 3 and report.chart.techniques() == ["offset"]
+
+
+def test_a_cancelled_chart_leaves_an_earlier_whole_one(furnace, offset, tmp_path):
+    chart_scene(furnace, tmp_path / "chart", ["offset"], seeds=1, maps=False, **QUICK)
+    before = {path.name: path.read_bytes() for path in (tmp_path / "chart").iterdir()}
+    progress = Progress()
+    offset.on_bake = lambda number: number == len(offset.bakes) > 6 and progress.cancel()
+    with pytest.raises(Cancelled, match=r"are in .*chart\.partial, the chart in .*chart is the earlier one"):
+        chart_scene(furnace, tmp_path / "chart", ["offset"], seeds=2, maps=False, progress=progress, **QUICK)
+    assert {path.name: path.read_bytes() for path in (tmp_path / "chart").iterdir()} == before
+    offset.on_bake = lambda number: None
+    chart_scene(furnace, tmp_path / "chart", ["offset"], seeds=2, maps=False, resume=True, **QUICK)
+    assert json.loads((tmp_path / "chart/chart.json").read_text())["seeds"] == 2 and os.listdir(tmp_path) == ["chart"]
+
+
+def test_what_a_user_put_or_changed_there_is_never_lost(furnace, offset, tmp_path):
+    out = tmp_path / "chart"
+    out.mkdir()
+    (out / "chart.md").write_text("my notes")
+    with pytest.raises(BakeError, match=r"chart\.md is not of rtgi"):
+        chart_scene(furnace, out, ["offset"], seeds=1, maps=False, **QUICK)
+    assert not offset.bakes and (out / "chart.md").read_text() == "my notes"
+    (out / "chart.md").rename(out / "notes.txt")
+    chart_scene(furnace, out, ["offset"], seeds=1, maps=False, **QUICK)
+    (out / "chart.md").write_text("edited")
+    bakes = len(offset.bakes)
+    with pytest.raises(BakeError, match=r"chart\.md was changed since it was written"):
+        chart_scene(furnace, out, ["offset"], seeds=1, maps=False, **QUICK)
+    assert len(offset.bakes) == bakes and (out / "chart.md").read_text() == "edited"
+    (out / "chart.md").unlink()
+    chart_scene(furnace, out, ["offset"], seeds=1, maps=True, **QUICK)
+    chart_scene(furnace, out, ["offset"], seeds=1, maps=False, **QUICK)
+    assert (out / "notes.txt").read_text() == "my notes" and not (out / "error_offset.png").exists()
 
 
 def test_cancelled_before_the_first_bake_nothing_is_there(furnace, offset, tmp_path):
@@ -124,7 +211,7 @@ def test_wrong_wishes(furnace, tmp_path):
     with pytest.raises(UsageError, match="unknown volume"):
         chart_scene(furnace, tmp_path / "chart", ["probes"], volume="nowhere", **QUICK)
     (tmp_path / "file").write_text("")
-    with pytest.raises(BakeError, match="cannot write"):
+    with pytest.raises(BakeError, match="is a file"):
         chart_scene(furnace, tmp_path / "file", ["probes"], **QUICK)
 
 
@@ -136,6 +223,6 @@ def test_every_technique_in_a_box(tmp_path):
     assert chart.techniques() == techniques.names() and chart.left_out == ()
     best = {name: min(point.error("probes") for point in chart.points if point.technique == name and point.lattice == 1)
             for name in chart.techniques()}
-    assert [point.lattice for point in chart.points if point.technique == "probes"] == [0.5, 1, 1, 1, 1, 1, 2]
+    assert [point.lattice for point in chart.points if point.technique == "probes"] == [0.5, 1, 1, 1, 1, 1, 1, 2]
     assert best["probes"] < 0.02 and best["vpl"] < 0.1 < best["rsm"]
     assert all(point.cost("peak_bytes") is None or point.cost("peak_bytes") > 0 for point in chart.points)

@@ -1,6 +1,7 @@
 """The export as a job: what it refuses, and that it is the same from the module's command line."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -10,7 +11,7 @@ from scene_builders import closed_box
 
 from rtgi_addon.errors import BakeError, Cancelled, UsageError
 from rtgi_addon.exchange.bundle import write_bundle
-from rtgi_addon.exchange.engines.conformance import kit_field
+from rtgi_addon.exchange.engines.kit import kit_field
 from rtgi_addon.jobs.export import export_bundle
 from rtgi_addon.progress import Progress
 
@@ -30,24 +31,39 @@ def rtgi(*words):
 
 @pytest.mark.parametrize(("engine", "name"), [("godot", "godot"), ("threejs", "threejs"), ("three", "threejs")])
 def test_a_bundle_on_disk_becomes_an_export(bundle, tmp_path, engine, name):
-    report = export_bundle(bundle, engine, tmp_path / "out", model_notes=["lacks a lamp"])
+    report = export_bundle(bundle, engine, tmp_path / "out", missing_lamps=["Window"], even_lamps=["Beamer"])
     assert report.out == tmp_path / "out" and report.engine == name
-    assert all((report.out / name).is_file() for name in report.files) and report.notes == ("lacks a lamp",)
+    assert all((report.out / name).is_file() for name in report.files)
+    assert report.notes == ("glTF has no area lamps, the model lacks Window: bake with direct light (--direct, Include Lamps) to "
+                            "have theirs in the probes",
+                            "glTF has no lamps with a profile: the model has Beamer as bright as on average everywhere")
 
 
 def test_what_will_not_do_is_said_before_anything_is_written(bundle, tmp_path):
     model = tmp_path / "model.glb"
     model.write_bytes(b"not one")
     (tmp_path / "model.obj").write_text("")
+    (tmp_path / "folder.glb").mkdir()
     for error, match, arguments, options in (
             (UsageError, "unknown engine 'doom'", (bundle, "doom", tmp_path / "out"), {}),
             (BakeError, "not glTF Binary", (bundle, "godot", tmp_path / "out"), {"model": model}),
             (UsageError, "not a .glb", (bundle, "godot", tmp_path / "out"), {"model": tmp_path / "model.obj"}),
-            (BakeError, "cannot read the model", (bundle, "godot", tmp_path / "out"), {"model": tmp_path / "none.glb"}),
+            (BakeError, r"cannot read .*none\.glb, no such file", (bundle, "godot", tmp_path / "out"),
+             {"model": tmp_path / "none.glb"}),
+            (BakeError, "is a folder where a file should be", (bundle, "godot", tmp_path / "out"),
+             {"model": tmp_path / "folder.glb"}),
             (BakeError, "there is no bundle", (tmp_path / "none", "godot", tmp_path / "out"), {}),
-            (BakeError, "does not exist", (bundle, "godot", tmp_path / "no/out"), {})):
+            (BakeError, "is no folder", (bundle, "godot", tmp_path / "model.glb/out"), {})):
         with pytest.raises(error, match=match):
             export_bundle(*arguments, **options)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
+def test_a_pipe_in_the_place_of_a_model_is_not_waited_for(bundle, tmp_path):
+    os.mkfifo(tmp_path / "pipe.glb")
+    with pytest.raises(BakeError, match=r"pipe\.glb is a pipe"):
+        export_bundle(bundle, "godot", tmp_path / "out", model=tmp_path / "pipe.glb")
     assert not (tmp_path / "out").exists()
 
 
@@ -79,7 +95,8 @@ def test_the_command_line(bundle, tmp_path):
     done = rtgi(bundle, "--engine", "godot", "--out", tmp_path / "out", "--no-conformance", "--json")
     assert done.returncode == 0, done.stderr
     report = json.loads(done.stdout)
-    assert report["engine"] == "godot" and report["volumes"] == ["Known", "Hard", "Inset"] and report["bytes"] > 10000
+    assert report["volumes"] == ["Known", "Hard", "Inset", "Weights", "Scattered"]
+    assert report["engine"] == "godot" and report["bytes"] > 10000
     assert not [name for name in report["files"] if name.startswith("conformance/")]
     unknown = rtgi(bundle, "--engine", "doom", "--out", tmp_path / "out")
     assert unknown.returncode == 2 and "choose one of godot" in unknown.stderr and len(unknown.stderr.splitlines()) == 1

@@ -55,7 +55,7 @@ def test_the_summary_is_json_and_text(tmp_path, grid):
     values = json.loads(json.dumps(summary.to_json(), allow_nan=False))
     assert values["rays"] == 2_000_000 and values["volumes"][0]["usable"] == 8 and values["stats"] == {"odd": None}
     text = summary.to_text()
-    for words in ("(resumed)", "2 × 2 × 2 probes, order 1, 100.0 % usable", "estimated error 1 %", "fitted to the scene",
+    for words in ("(resumed)", "2 × 2 × 2 probes, order 1, 100.0 % usable", "noise at probes 1 %", "fitted to the scene",
                   "2,000,000, 1.0 million a second", "2.00 (bake 1.50, write 0.50)", "3 MiB", "fitted a volume",
                   "too bright: dim it"):
         assert words in text

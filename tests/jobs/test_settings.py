@@ -3,6 +3,7 @@
 import pytest
 from tiny_technique import TinyTechnique
 
+from rtgi_addon import effects
 from rtgi_addon.errors import UsageError
 from rtgi_addon.jobs.settings import build_settings
 
@@ -25,6 +26,18 @@ def test_what_does_not_fit_is_refused_by_name(name, text, words):
     with pytest.raises(UsageError, match=words) as caught:
         build_settings(TinyTechnique(), {name: text})
     assert name in caught.value.cause
+
+
+def test_colours_and_settings_of_effects_are_read_alike():
+    mist = effects.get("mist")
+    assert build_settings(mist, {"color": "0.1, 0.2,3", "start": "2"}, "effect") == mist.Settings(color=(0.1, 0.2, 3.0), start=2.0)
+    for text in ("1,2", "red", "1,2,x"):
+        with pytest.raises(UsageError, match="give 3 numbers with commas"):
+            build_settings(mist, {"color": text}, "effect")
+    with pytest.raises(UsageError, match=r"color is -1: give at least 0"):
+        build_settings(mist, {"color": "0,-1,0"}, "effect")
+    with pytest.raises(UsageError, match=r"effect 'mist' has no setting 'x'"):
+        build_settings(mist, {"x": "1"}, "effect")
 
 
 def test_values_that_are_not_text_pass_through():

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from rtgi_addon.numerics.sampling import sobol_owen
-from rtgi_addon.preview.camera_view import CameraView
 from rtgi_addon.preview.lamp_choice import choose_lamps, lamp_chances
-from rtgi_addon.preview.lamp_sample import ball_point, sample_lamp
+from rtgi_addon.preview.lamp_sample import sample_lamp
 from rtgi_addon.preview.shadow_parts import cascade_splits, shadow_parts
 from rtgi_addon.scene import AreaLight, PointLight, SpotLight, SunLight
+from rtgi_addon.transport.lights.point import ball_point
+from rtgi_addon.transport.views.camera import CameraView
 
 BOUNDS = np.array([[-3.0, -3.0, 0.0], [3.0, 3.0, 4.0]])
 DOWN = np.float32([0, 0, -1])

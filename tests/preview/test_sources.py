@@ -4,15 +4,21 @@ import re
 
 import pytest
 
+from rtgi_addon.effects import registry
 from rtgi_addon.preview import programs
+from rtgi_addon.preview.effects import has_shader
+from rtgi_addon.preview.effects.programs import pixel_program
 from rtgi_addon.preview.program import Image, Program, declarations
 from rtgi_addon.preview.sources import SHADERS, source
 from rtgi_addon.preview.uniforms import UniformStruct
+from rtgi_addon.scene import Scene
 
 PROGRAMS = {name: value for name, value in vars(programs).items() if isinstance(value, Program)}
 SURFACES = {f"{name} {uvs} {colors} {smooth}": programs.surface_program(name, uvs, colors, smooth)
             for name in programs.SURFACE_PASSES for uvs, colors, smooth in ((0, 0, False), (2, 1, True))}
-ALL = {**PROGRAMS, **SURFACES}
+EFFECTS = {f"effect {name}": pixel_program(name, effect.parameters(effect.Settings(), Scene("empty")))
+           for name, effect in registry().items() if has_shader(name)}
+ALL = {**PROGRAMS, **SURFACES, **EFFECTS}
 
 
 def stages(program):

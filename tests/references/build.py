@@ -18,7 +18,7 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 sys.path.insert(0, str(ROOT))
 
-from rtgi_addon.blender.cycles_reference import CyclesSettings, points_in_the_open, render_probes, volume_points  # noqa: E402
+from rtgi_addon.blender.cycles.reference import CyclesSettings, points_in_the_open, render_probes, volume_points  # noqa: E402
 
 SAMPLES = ("cornell_box", "furnace", "integrating_sphere", "two_rooms", "corridor_door_ajar", "sky_courtyard", "sun_window",
            "atrium", "many_lights", "outdoor_hdri", "adversarial")
@@ -38,7 +38,7 @@ def relative_error(mean: np.ndarray, variance: np.ndarray) -> float:
 def build(name: str, target: float, seconds: float, threads: int | None) -> None:
     """Render the reference of one sample and write its file."""
     bpy.ops.wm.open_mainfile(filepath=str(ROOT / "sample_blends" / f"{name}.blend"))
-    volume = next(obj for obj in bpy.context.scene.objects if obj.type == "LIGHT_PROBE")
+    volume = next(obj for obj in bpy.context.scene.objects if obj.type == "LIGHT_PROBE" and obj.data.type == "VOLUME")
     resolution = np.array((volume.data.resolution_x, volume.data.resolution_y, volume.data.resolution_z))
     lattice = volume_points(bpy.context.scene)
     clearance = 0.2 * float((np.array(volume.scale) * 2 / resolution).min())

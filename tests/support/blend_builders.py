@@ -1,6 +1,7 @@
 """Small things to put into an open .blend. Needs the bpy module."""
 
 import bpy
+import numpy as np
 
 
 def link(name, data, matrix=None, collection=None):
@@ -31,3 +32,14 @@ def material(name, color):
     diffuse.inputs["Color"].default_value = (*color, 1.0)
     tree.links.new(diffuse.outputs[0], output.inputs["Surface"])
     return made
+
+
+def point_cloud(name, points, radius, made_of):
+    """A cloud of balls, which a bake does not follow, linked to the scene."""
+    cloud = bpy.data.pointclouds.new(name)
+    cloud.resize(len(points))
+    cloud.attributes["position"].data.foreach_set("vector", np.asarray(points, np.float32).ravel())
+    sizes = cloud.attributes.get("radius") or cloud.attributes.new("radius", "FLOAT", "POINT")
+    sizes.data.foreach_set("value", np.full(len(points), radius, np.float32))
+    cloud.materials.append(made_of)
+    return link(name, cloud)

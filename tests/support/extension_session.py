@@ -35,7 +35,9 @@ def traces() -> set[str]:
         if hasattr(kind, "bl_rna"):
             found |= {f"property {name}.{key}" for key in kind.bl_rna.properties.keys()}
         found |= {f"engine of {name}: {engine}" for engine in getattr(kind, "COMPAT_ENGINES", None) or ()}
-        found |= {f"drawn in {name}: {named(function)}" for function in getattr(getattr(kind, "draw", None), "_draw_funcs", ())}
+        # Whoever adds to what is drawn makes a list of it, with Blender's own function at its head.
+        found |= {f"drawn in {name}: {named(function)}" for function in getattr(getattr(kind, "draw", None), "_draw_funcs", ())
+                  if named(function) != f"{kind.__module__}.{name}.draw"}
     for event in dir(bpy.app.handlers):
         handlers = getattr(bpy.app.handlers, event)
         if isinstance(handlers, list):

@@ -97,8 +97,8 @@ def of_source():
             if called(node) in {"label", "prop", "operator", "menu", "row", "column", "popover", "progress"} and translated:
                 for name in SHOWING & set(options):
                     found.update({text: where for text in _texts(options[name], constants)})
-    from rtgi_addon.blender.preset_ui import TOOLTIPS
-    found.update({text: "blender/preset_ui.py" for text in TOOLTIPS.values()})
+    from rtgi_addon.blender.ui.presets import TOOLTIPS
+    found.update({text: "blender/ui/presets.py" for text in TOOLTIPS.values()})
     return {text: where for text, where in found.items() if text.strip()}
 
 
@@ -135,7 +135,7 @@ def sentences():
     found = {}
     for path in sorted(PACKAGE.rglob("*.py")):
         parts = path.relative_to(PACKAGE).parts
-        if parts[:2] == ("blender", "cli") or parts[:2] == ("blender", "translations") or path.name == "cycles_reference.py":
+        if parts[:2] == ("blender", "cli") or parts[:2] == ("blender", "translations"):
             continue
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if not isinstance(node, ast.Call):
@@ -154,9 +154,13 @@ def _patterns_of(node):
         return [text for text in (texts[2] and _renumbered(f"{subject} ", texts[2]), texts[3]) if text]
     if name in {"step", "Shown"} and len(texts) > 1:
         return [texts[1]] if texts[1] else []
-    if name == "_note" and texts and texts[-1]:
+    owner = getattr(node.func, "value", None)
+    if name == "add" and getattr(owner, "attr", getattr(owner, "id", "")) in {"omissions", "_omissions"}:
+        remedies = [_pattern(option.value) for option in node.keywords if option.arg == "remedy"]
+        return [text for text in (*texts[:1], *remedies) if text]
+    if name in {"_note", "_omit"} and texts and texts[-1]:
         return [texts[-1] if len(texts) == 1 else _renumbered("{0} ", texts[-1])]
-    if name == "_remark" or (name == "append" and getattr(getattr(node.func, "value", None), "id", "") == "notes"):
+    if name == "_remark" or (name == "append" and getattr(owner, "id", "") == "notes"):
         return [texts[0]] if texts and texts[0] else []
     return []
 

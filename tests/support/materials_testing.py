@@ -4,6 +4,7 @@ import addon_utils
 import bpy
 import numpy as np
 
+from rtgi_addon.blender.extract import extract_scene
 from rtgi_addon.blender.materials import ACTIVE_COLOR, MaterialReader
 from rtgi_addon.scene import Mesh
 
@@ -107,6 +108,24 @@ def read_object(thing):
             mesh, baked = reader.bake(request, mesh, loops)
             materials = [baked.get(slot, material) for slot, material in enumerate(materials)]
     return materials, mesh, reader, loops
+
+
+def said_of(reader):
+    """What a reader says it does not follow, as one text."""
+    return "\n".join(map(str, reader.omissions.all()))
+
+
+def read_scene(with_mesh=False):
+    """[(object name, materials by slot, 4×4 matrix)] of everything that extraction finds, in its order, and each one's mesh."""
+    scene = extract_scene()
+    found = []
+    for instance in scene.instances:
+        mesh = scene.meshes[instance.mesh]
+        override = instance.material_override or {}
+        used = [override.get(int(index), int(index)) for index in np.unique(mesh.triangle_material)]
+        entry = instance.name, [scene.materials[index] for index in used], np.array(instance.world_from_local)
+        found.append((*entry, mesh) if with_mesh else entry)
+    return found
 
 
 def arrays_of(data):

@@ -6,7 +6,7 @@ import numpy as np
 
 from rtgi_addon.errors import BakeError
 from rtgi_addon.techniques import ProbeGrid, Technique, setting
-from rtgi_addon.techniques.probes.field import ProbeField
+from rtgi_addon.techniques.lattice.field import ProbeField
 
 
 @dataclass(frozen=True)

@@ -109,7 +109,7 @@ def story():
 
     with in_view():
         bpy.ops.rtgi.bake("INVOKE_DEFAULT")
-    yield from until(lambda: not module.session.baking)
+    yield from until(lambda: not module.session.scene)
     yield 1.0
     yield from until(settled)
     looked_at("baked")

@@ -62,6 +62,23 @@ def panel_room(albedo=0.5, side=0.4, emission=10.0, **volume_options):
                        volumes=[build.volume(**volume_options)], name="panel_room")
 
 
+def spotted_room(texels=256, radiance=3e5, **volume_options):
+    """A closed box under a black panel of which one texel of ``texels``² shines; and the same with that texel as a square of its
+    own, which has the same light."""
+    side, column, row = 1.6, 200, 37
+    corner = np.float32([-0.5 * side, -0.5 * side, 0.998])
+    pixels = np.zeros((texels, texels, 3), np.float32)
+    pixels[row, column] = radiance
+    spotted = Material("panel", Channel.of(0.0), Channel(texture=Texture("spot", pixels)))
+    walls = [build.cube("room", 1.0, inward=True), quad("panel", corner, (side, 0, 0), (0, side, 0), 1)]
+    texel = side / texels
+    spot = quad("spot", corner + np.float32([column * texel, row * texel, -1e-3]), (texel, 0, 0), (0, texel, 0), 2)
+    grey, black = build.material("wall", 0.6), build.material("black", 0.0)
+    volumes = [build.volume(**volume_options)]
+    return (build.scene(walls, [grey, spotted], volumes=volumes, name="spotted_room"),
+            build.scene([*walls, spot], [grey, black, build.material("spot", 0.0, radiance)], volumes=volumes, name="spot_room"))
+
+
 def many_lamps(count=30, albedo=0.6, seed=7, **volume_options):
     """A closed box with ``count`` coloured point lamps of very different strength, and a block that shades some from others."""
     rng = np.random.default_rng(seed)

@@ -93,7 +93,7 @@ def closed_box(albedo=0.5, intensity=1.0, half_size=1.0, light_position=(0.0, 0.
 
 
 def cube_furnace(albedo=0.5, emission=1.0, half_size=1.0, **volume_options):
-    """A closed cube whose walls all emit: radiance is emission/(1−albedo) everywhere and in every direction (PHYSICS.md §2)."""
+    """A closed cube whose walls all emit: radiance is emission/(1−albedo) from everywhere to everywhere (docs/physics.md §2)."""
     return scene([cube("furnace", half_size, inward=True)], [material("glow", albedo, emission)],
                  volumes=[volume(**volume_options)], name="furnace")
 

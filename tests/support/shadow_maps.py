@@ -2,8 +2,8 @@
 
 from rtgi_addon.techniques.rsm.gather import prepare
 from rtgi_addon.transport.context import LightContext
-from rtgi_addon.transport.reflective_shadow_map import capture
-from rtgi_addon.transport.shadow_views import views_of
+from rtgi_addon.transport.views.reflective_shadow_map import capture
+from rtgi_addon.transport.views.shadow_views import views_of
 
 
 def prepared(scene, resolution=256, samples=400, threads=1, **options):

@@ -3,7 +3,6 @@
 Run as a script it is the command line with this technique in place of the real ones.
 """
 
-import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -11,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import rtgi_addon.techniques as techniques
-from rtgi_addon.techniques import Field, ProbeGrid, Technique, setting
+from rtgi_addon.techniques import Checkpoint, Field, ProbeGrid, Technique, setting
 
 TILE = 4
 
@@ -22,7 +21,8 @@ class TinyField(Field):
     technique = "tiny"
 
     def __init__(self, grids, includes_direct, stats):
-        self._grids, self.includes_direct, self.stats, self.params = tuple(grids), includes_direct, stats, {}
+        self._grids, self.stats, self.params = tuple(grids), stats, {}
+        self.direct_lamps = None if includes_direct else frozenset()
 
     def irradiance(self, points, normals):
         """Nowhere any light."""
@@ -59,7 +59,7 @@ class TinyTechnique(Technique):
 
     def bake(self, scene, settings, rng, progress, *, threads=None, checkpoint=None):
         """Random grids for every volume."""
-        base = int(rng.integers(2**31))
+        checkpoint, base = checkpoint or Checkpoint(), int(rng.integers(2**31))
         total = sum(volume.resolution[2] for volume in scene.volumes)
         done, loaded, grids = 0, 0, []
         for number, volume in enumerate(scene.volumes):
@@ -115,7 +115,6 @@ def install(monkeypatch=None):
 
 if __name__ == "__main__":
     install()
-    from rtgi_addon.__main__ import leave
-    from rtgi_addon.blender.cli import main_module
+    from rtgi_addon.__main__ import leave, main
 
-    leave(main_module(sys.argv[1:]))
+    leave(main())

@@ -21,7 +21,7 @@ LONG, SHORT = 1 << 18, 64  # rays per probe: long enough to be interrupted, shor
 
 seen = {"error": "did not finish"}
 module = importlib.import_module(f"{ADDON}.blender.session")
-wording = importlib.import_module(f"{ADDON}.blender.progress_text")
+wording = importlib.import_module(f"{ADDON}.blender.ui.progress_text")
 
 
 def session():
@@ -71,7 +71,7 @@ def until(done, seconds=60.0, step=0.1):
 
 
 def ended():
-    return not session().baking
+    return not session().scene
 
 
 def picture(name):
@@ -123,11 +123,11 @@ def show_volume():
 
 
 def click_bake():
-    """Move down the sidebar from below its first header, clicking, until a bake starts."""
+    """Move down the sidebar from below its first header, clicking, until a bake starts; notes may stand above the button."""
     sidebar = region("VIEW_3D", "UI")
     scale = bpy.context.preferences.system.ui_scale
     x = sidebar.x + sidebar.width // 2
-    for down in range(50, 130, 8):
+    for down in range(50, 300, 8):
         y = sidebar.y + sidebar.height - int(down * scale)
         window().event_simulate("MOUSEMOVE", "NOTHING", x=x, y=y)
         yield 0.1
@@ -189,7 +189,7 @@ def story():
     yield 0.1
     with in_view():
         bpy.ops.ed.undo()
-    seen["baking after undo"] = bool(session().baking)
+    seen["baking after undo"] = bool(session().scene)
     yield from until(ended)
     yield 0.2
     with in_view():

@@ -72,7 +72,10 @@ CASES = {
 # Where a technique says itself that it is no use, and why.
 BEYOND = {
     ("lpv", "uniform sky"): "light propagation volumes want geometry in them, and say so",
-    ("lpv", "bright integrating sphere"): "what is reflected ten times leaves a round wall of cells through its seams: -64 %",
+    ("cone_tracing", "uniform sky"): "voxels want geometry in them, and say so",
+    ("voxel_march", "uniform sky"): "voxels want geometry in them, and say so",
+    ("cone_tracing", "grey floor under a sky"): "the floor goes on beyond the voxels, where it is black, and the bake says so",
+    ("voxel_march", "grey floor under a sky"): "the floor goes on beyond the voxels, where it is black, and the bake says so",
 }
 
 
@@ -100,7 +103,7 @@ def test_irradiance_is_exact_within_the_declared_tolerance(name, case):
 def test_techniques_declare_themselves(name):
     technique = techniques.get(name)
     assert technique.name == name and technique.label and technique.description
-    # Light volumes are a preview: their cells blur what the others resolve.
-    assert 0 < technique.tolerance <= (0.65 if name == "lpv" else 0.1)
+    # Light volumes are a preview: their cells blur what the others resolve. Few cones see little near the horizon.
+    assert 0 < technique.tolerance <= {"lpv": 0.4, "cone_tracing": 0.15}.get(name, 0.1)
     assert technique.knows and technique.knows <= KNOWN_LIGHT
     techniques.validate_settings(technique.Settings())

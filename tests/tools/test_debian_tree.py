@@ -1,19 +1,19 @@
 """The Debian tree's tool: which mirror it reads, and what a command in the tree sees."""
 
-import importlib.util
+import sys
 from pathlib import Path
 
 import pytest
 
-TOOL = Path(__file__).resolve().parents[2] / "tools/debian_tree.py"
+TOOLS = Path(__file__).resolve().parents[2] / "tools"
 
 
 @pytest.fixture
-def tool():
-    spec = importlib.util.spec_from_file_location("debian_tree", TOOL)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def tool(monkeypatch):
+    monkeypatch.syspath_prepend(str(TOOLS))
+    monkeypatch.delitem(sys.modules, "debian_tree", raising=False)
+    import debian_tree
+    return debian_tree
 
 
 @pytest.mark.parametrize(("name", "text", "mirror"), [

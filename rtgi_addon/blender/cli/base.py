@@ -13,7 +13,8 @@ EXTRACT_SHARE = 0.05
 
 
 class Report(Protocol):
-    """A subcommand's result: ``to_json()`` is printed by `--json`, ``to_text()`` without."""
+    """A subcommand's result: ``to_json()`` is printed by `--json`, ``to_text()`` without. One that has found something wrong may
+    have a BakeError as ``refusal``: then the command has failed."""
 
     def to_json(self) -> dict:
         """The result as JSON-able values."""
@@ -26,12 +27,15 @@ class Report(Protocol):
 class Session:
     """What a door hands to a subcommand: ``progress`` to report to and be cancelled by, and ``read_scene`` which opens the
     FILE (or takes the one that is open) and extracts it; ``open_file`` only opens it. Nothing else here touches Blender.
-    ``has_file`` says whether there is a FILE, for those that can do without."""
+    ``has_file`` says whether there is a FILE, for those that can do without; ``inputs`` are the files it will be read from, as far
+    as they are known before. ``read_frame`` reads the scene of another frame of the same FILE."""
 
     progress: Progress
     read_scene: Callable[[], Scene]
     has_file: bool = True
     open_file: Callable[[], None] = lambda: None
+    inputs: tuple[str, ...] = ()
+    read_frame: Callable[[int, Progress], Scene] | None = None
 
 
 @dataclass(frozen=True)

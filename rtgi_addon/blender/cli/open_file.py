@@ -1,49 +1,55 @@
 """Getting a scene into Blender: a .blend, a glTF file, or what is open already."""
 
 import re
+import stat
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import bpy
 
 from ...errors import BakeError
-from .. import properties
+from ...scene import Omission
+from ...storage.files import disk_error
+from ...storage.paths import resolved
+from ..ui import properties, role_properties
+from .gltf import import_gltf
 
 _GLTF = (".glb", ".gltf")
 
 
 @contextmanager
 def known_properties() -> Iterator[None]:
-    """Register the add-on's properties, through which volumes' overrides are read, for as long as the add-on itself is not
-    enabled: in Blender as a Python module it never is."""
+    """Register the add-on's properties, through which volumes' overrides and what objects and lamps are to bakes are read, for as
+    long as the add-on itself is not enabled: in Blender as a Python module it never is."""
     if hasattr(bpy.types.LightProbe, "rtgi"):
         yield
         return
-    try:
-        properties.register()
+    with ExitStack() as stack:
+        for module in (properties, role_properties):
+            module.register()
+            stack.callback(module.unregister)
         yield
-    finally:
-        properties.unregister()
 
 
-def open_file(name: str) -> None:
-    """Open a .blend, or import a .glb or .gltf into an empty file. Raises BakeError for a file that is missing, damaged, of a
-    newer Blender or of another kind."""
+def open_file(name: str, scripts: bool = False) -> tuple[Omission, ...]:
+    """Open a .blend (``scripts``: and run its Python), or import a .glb or .gltf into an empty file; returns what of that Blender
+    did not take in. Raises BakeError for a file that is missing, damaged, of a newer Blender or of another kind."""
     path = _existing(name)
     if path.suffix.lower() in _GLTF:
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-        _import_gltf(path)
-    elif path.suffix.lower().startswith(".blend"):
-        _open_blend(path)
-    else:
-        raise BakeError(f"{path} is neither a .blend nor a .glb or .gltf", "convert it, or correct the path")
+        return _import_gltf(path)
+    if path.suffix.lower().startswith(".blend"):
+        _open_blend(path, scripts)
+        return ()
+    raise BakeError(f"{path} is neither a .blend nor a .glb or .gltf", "convert it, or correct the path")
 
 
-def take_open_file(imported: str | None) -> None:
-    """Take the file that Blender was started with, and import the glTF file ``imported`` into it, or in place of the startup
-    scene if there is none. Raises BakeError if there is neither."""
+def take_open_file(imported: str | None, scripts: bool = False) -> tuple[Omission, ...]:
+    """Take the file that Blender was started with (``scripts``: with its Python run), and import the glTF file ``imported`` into
+    it, or in place of the startup scene if there is none; returns what of that Blender did not take in. Raises BakeError if there
+    is neither."""
     if not bpy.data.filepath:
         # Blender goes on with its startup scene after a FILE that it could not read.
         file = next((word for word in sys.argv[1:] if word.lower().endswith(".blend")), None)
@@ -55,23 +61,28 @@ def take_open_file(imported: str | None) -> None:
         bpy.data.batch_remove(list(bpy.data.objects))
         bpy.context.scene.world = None
     else:
+        if scripts and bpy.app.autoexec_fail:
+            _open_blend(Path(bpy.data.filepath), scripts)
         _require_known_version(Path(bpy.data.filepath))
-    if imported is not None:
-        _import_gltf(_existing(imported))
+    return () if imported is None else _import_gltf(_existing(imported))
 
 
 def _existing(name: str) -> Path:
-    path = Path(name).expanduser().resolve()
-    if not path.exists():
-        raise BakeError(f"there is no file {path}", "correct the path")
-    if not path.is_file():
+    path = resolved(name, "the path")
+    try:
+        kind = path.stat().st_mode
+    except FileNotFoundError:
+        raise BakeError(f"there is no file {path}", "correct the path") from None
+    except OSError as error:
+        raise disk_error(path, error, doing="read") from error
+    if not stat.S_ISREG(kind):
         raise BakeError(f"{path} is not a file", "correct the path")
     return path
 
 
-def _open_blend(path: Path) -> None:
+def _open_blend(path: Path, scripts: bool) -> None:
     try:
-        bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False, use_scripts=False)
+        bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False, use_scripts=scripts)
     except RuntimeError as error:
         raise BakeError(f"{path} is not a .blend that Blender {bpy.app.version_string} can read, {_reason(error)}",
                         "restore it from a backup, or save it again with the Blender that made it") from error
@@ -86,11 +97,11 @@ def _require_known_version(path: Path) -> None:
                         f"bake with Blender {saved[0]}.{saved[1]} or later")
 
 
-def _import_gltf(path: Path) -> None:
+def _import_gltf(path: Path) -> tuple[Omission, ...]:
     if path.suffix.lower() not in _GLTF:
         raise BakeError(f"{path} is not a .glb or .gltf", "correct the path")
     try:
-        bpy.ops.import_scene.gltf(filepath=str(path))
+        return import_gltf(path)
     except RuntimeError as error:
         raise BakeError(f"{path} is not glTF that Blender can import, {_reason(error)}",
                         "export it again, or import it in Blender and save a .blend") from error

@@ -13,8 +13,14 @@ class Streams:
     """
 
     def __init__(self, loud: bool = False):
-        sys.stdout.flush()
-        sys.stderr.flush()
+        for number, stream in ((1, sys.stdout), (2, sys.stderr)):
+            # None, and a number that is nobody's, where whoever started us closed it.
+            if stream is not None:
+                stream.flush()
+            try:
+                os.fstat(number)
+            except OSError:
+                os.dup2(os.open(os.devnull, os.O_WRONLY), number)
         self.out = os.fdopen(os.dup(1), "w", encoding="utf-8", errors="replace")
         self.err = os.fdopen(os.dup(2), "w", encoding="utf-8", errors="replace")
         if loud:

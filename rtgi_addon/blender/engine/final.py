@@ -1,16 +1,28 @@
 """F12: one view layer as a picture, sample by sample, with its passes."""
 
 import time
+from collections.abc import Callable
 
 import numpy as np
 
+from ...effects import Chosen, notes_of
+from ...effects.atlas.relight import STALE_ATLAS, is_left_out
+from ...effects.gathering import by_rays, reached_text
+from ...effects.picture import draw_pictures
 from ...errors import BakeError, Cancelled
 from ...progress import Progress
-from ...scene import Camera
+from ...scene import Camera, Scene, drawn_otherwise
+from ...techniques import Field
+from ...techniques.probes.live import LiveSettings
 from ..extract import extract_scene
 from ..extract.cameras import read_camera
-from ..preview_settings import preview_settings
+from ..session import session
 from ..translations import sentence
+from ..ui.effect_settings import chosen_effects
+from ..ui.light_settings import in_its_light
+from ..ui.preview_settings import preview_settings
+from ..ui.progress_text import progress_parts
+from ..worker import Report
 from .layer import OverlayLayer
 from .passes import add_passes, passes_of, write_passes
 from .shown import lit_for, shown_for
@@ -21,32 +33,68 @@ _SHOW_EVERY, _READING, _RELIGHTING = 0.5, 0.1, 0.1
 
 def render(engine, depsgraph) -> None:
     """Render ``depsgraph``'s view layer into ``engine``'s result. Raises BakeError, Cancelled."""
-    from ...preview.camera_view import CameraView
-    from ...preview.renderer import PreviewRenderer  # importable once there is a GPU
     layer, original = depsgraph.view_layer, depsgraph.scene.original
     size = _result_size(engine, layer)
     progress = _progress(engine)
     engine.update_stats("", sentence("Reading the scene"))
-    scene = extract_scene(depsgraph, progress=progress.span(0.0, _READING), reuse=True)
+    read = extract_scene(depsgraph, progress=progress.span(0.0, _READING), reuse=True)
+    session.note_media(original.name, read)
+    scene = in_its_light(read, original)
     camera = cropped(_camera(depsgraph), depsgraph.scene.render, size)
     shown = shown_for(original)
-    if shown.note:
-        engine.report({"INFO"}, sentence(shown.note))
+    effects, rays = chosen_effects(original), original.rtgi_preview.gather == "rays"
+    effects = by_rays(effects) if rays else effects
+    # A picture by rays looks at a bake only for what media scatter more than once.
+    looks_at_bake = bool(scene.media) or not rays
+    for note in (shown.note if looks_at_bake else "", drawn_otherwise(scene), *notes_of(effects, scene)):
+        if note:
+            engine.report({"INFO"}, sentence(note))
     engine.update_stats("", sentence("Relighting"))
-    field = lit_for(shown, scene, progress.span(_READING, _READING + _RELIGHTING))
+    try:
+        field = lit_for(shown, scene, progress.span(_READING, _READING + _RELIGHTING)) if looks_at_bake else None
+    except BakeError as error:
+        if shown.baked is not None or isinstance(shown.live, LiveSettings):
+            raise
+        # A bundle on disk may be of an earlier state of the file: it is shown as it was baked.
+        engine.report({"WARNING"}, sentence(str(error)))
+        field = shown.field
+    if is_left_out(field, shown.field):
+        engine.report({"INFO"}, sentence(STALE_ATLAS))
+    drawing = progress.span(_READING + _RELIGHTING, 1.0)
+    if rays:
+        _by_rays(engine, layer, original, scene, field, effects, camera, drawing)
+        return
+    from ...preview.renderer import PreviewRenderer  # importable once there is a GPU
+    from ...transport.views.camera import CameraView
     settings = preview_settings(original, final=True)
     renderer = PreviewRenderer(scene, field, settings, tuple(entry.source for entry in passes_of(layer)),
-                               None if shown.baked is None or field is not shown.field else shown.baked.scene, shown.live)
-    drawing = progress.span(_READING + _RELIGHTING, 1.0)
+                               None if shown.baked is None or field is not shown.field else shown.baked.scene, shown.live,
+                               effects)
     view, written = CameraView.of(camera), time.monotonic()
     for sample in range(settings.samples):
         drawing.step(sample / settings.samples, f"Sample {sample} of {settings.samples}")
         renderer.frame(view, size)
         if not engine.is_preview and time.monotonic() - written > _SHOW_EVERY:
-            _write(engine, layer, size, renderer)
+            _write(engine, layer, size, renderer.image)
             written = time.monotonic()
     overlay = _overlay(original, shown, view, size, renderer)
-    _write(engine, layer, size, renderer, overlay)
+    _write(engine, layer, size, renderer.image, overlay)
+    drawing.step(1.0, "Done")
+
+
+def _by_rays(engine, layer, original, scene: Scene, field: Field | None, effects: tuple[Chosen, ...], camera: Camera,
+             drawing: Progress) -> None:
+    """Fill the result with the picture of ``scene`` by rays of every pixel, and say how near it came."""
+    from ...transport.views.camera import CameraView
+    wanted = original.rtgi_preview
+    drawn = draw_pictures(scene, field, CameraView.of(camera), camera.resolution,
+                          shown=tuple(dict.fromkeys(entry.source for entry in passes_of(layer))), samples=wanted.gather_samples,
+                          error=wanted.gather_error, effects=effects, transparent=original.render.film_transparent,
+                          progress=drawing)
+    _write(engine, layer, camera.resolution, drawn.pictures.__getitem__)
+    engine.report({"INFO"}, sentence(reached_text(drawn.error, wanted.gather_error, drawn.samples)))
+    if wanted.overlays_in_renders:
+        engine.report({"WARNING"}, sentence("Overlays are not drawn over pictures by rays"))
     drawing.step(1.0, "Done")
 
 
@@ -97,10 +145,9 @@ def _camera(depsgraph) -> Camera:
 
 def _progress(engine) -> Progress:
     """A Progress that shows in Blender's bar and stops on ESC."""
-    def report(fraction, label, _seconds_left):
+    def report(fraction, label, seconds_left):
         engine.update_progress(fraction)
-        if label:
-            engine.update_stats("", sentence(label))
+        engine.update_stats("", ", ".join(progress_parts(Report(fraction, label, seconds_left))))
 
     return _Breakable(engine, report)
 
@@ -119,12 +166,12 @@ class _Breakable(Progress):
         super().check()
 
 
-def _write(engine, layer, size: tuple[int, int], renderer, overlay=None) -> None:
+def _write(engine, layer, size: tuple[int, int], image: Callable[[str], np.ndarray], overlay=None) -> None:
     add_passes(engine, layer)
     result = engine.begin_result(0, 0, *size, layer=layer.name)
     if result is None:
         raise Cancelled()
-    images = {entry.source: renderer.image(entry.source) for entry in passes_of(layer)}
+    images = {entry.source: image(entry.source) for entry in passes_of(layer)}
     if overlay is not None:
         from ...preview.overlays import laid_over
         images["combined"] = laid_over(images["combined"], overlay)

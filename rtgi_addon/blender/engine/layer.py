@@ -3,9 +3,14 @@
 import bpy
 import numpy as np
 
-from ..leaks_ui import leaks
-from ..preview_settings import overlay_settings
+from ...numerics.colour import linear_from_srgb
+from ...techniques.voxels.field import VoxelField
+from ..ui.leaks import leaks
+from ..ui.preview_settings import overlay_settings
 from .shown import Shown
+
+# Opacity of a leak's disc: where nothing is off, and at most, so that the surface still shows.
+_FAINTEST, _STRONGEST = 0.15, 0.9
 
 
 class OverlayLayer:
@@ -18,11 +23,12 @@ class OverlayLayer:
         """The overlays' texture over the latest frame of ``renderer``, a picture of the CameraView ``seen`` of ``size`` pixels;
         None where ``scene`` asks for nothing that there is."""
         from ...preview.overlays import Overlays  # importable once there is a GPU
-        settings = overlay_settings(scene)
+        settings, field = overlay_settings(scene), renderer.lit_by
         found = leaks.of(scene, shown.field) if settings.leaks else None
-        if (settings, shown.field, found) != self._of:
-            self._overlays = Overlays(settings, _grids(settings, shown), None if found is None else leak_discs(found))
-            self._of, self._drawn = (settings, shown.field, found), None
+        if (settings, field, found) != self._of:
+            self._overlays = Overlays(settings, _grids(settings, field), None if found is None else leak_discs(found),
+                                      spheres=None if field is None else field.spheres, voxels=voxels_of(field))
+            self._of, self._drawn = (settings, field, found), None
         if self._overlays.is_empty:
             return None
         before = self._drawn
@@ -32,19 +38,21 @@ class OverlayLayer:
         return self._texture
 
 
-def _grids(settings, shown: Shown) -> tuple:
+def _grids(settings, field) -> tuple:
     """The probe grids of what is shown, if something of them is asked for: other techniques take a while to make them."""
     wanted = settings.bounds or settings.probes != "none"
-    return shown.field.grids() if wanted and shown.field is not None else ()
+    return field.grids() if wanted and field is not None else ()
+
+
+def voxels_of(field):
+    """The lit voxels that ``field`` is gathered from, None for one that is not."""
+    return field.hierarchy if isinstance(field, VoxelField) else None
 
 
 def leak_discs(found):
     """A LeakMap as discs on the surfaces: blue where it is too dark, red where it is too bright, clear where it is right."""
-    from ...evaluate.error_map import COLOURS, FULL_SCALE
+    from ...evaluate.error_map import FULL_SCALE, error_colours
     from ...preview.overlay_shapes import Discs
-    share = np.clip(found.error / FULL_SCALE, -1.0, 1.0)
-    place = (0.5 + 0.5 * share) * (len(COLOURS) - 1)
-    encoded = np.stack([np.interp(place, np.arange(len(COLOURS)), channel) for channel in COLOURS.T], axis=1)
-    linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
-    alpha = np.minimum(0.15 + np.abs(share), 0.9)
-    return Discs(found.receivers.points, found.receivers.normals, found.radius, np.concatenate([linear, alpha[:, None]], axis=1))
+    alpha = np.minimum(_FAINTEST + np.abs(found.error / FULL_SCALE), _STRONGEST)
+    return Discs(found.receivers.points, found.receivers.normals, found.radius,
+                 np.concatenate([linear_from_srgb(error_colours(found.error)), alpha[:, None]], axis=1))

@@ -14,9 +14,9 @@ from ...errors import BakeError
 from ...scene import Scene
 from ..extract import extract_scene
 from ..extract.refresh import refresh_scene
-from ..extract.world import read_world
+from ..extract.world import read_mist, read_world
 from ..remembered import reuse
-from ..session import redraw
+from ..session import redraw, session
 
 # Edits that come faster than a scene is read are read once, this share of the time that reading takes after the last of them.
 _REST, _LONGEST = 1.0, 2.0
@@ -71,6 +71,7 @@ class LiveScene:
         try:
             if self.wants_all or self.scene is None:
                 self.scene = extract_scene(depsgraph, reuse=True)
+                session.note_media(depsgraph.scene.name, self.scene)
             else:
                 self._read_world(depsgraph)
             self.error = ""
@@ -84,10 +85,10 @@ class LiveScene:
             self._seconds = time.monotonic() - started
 
     def _read_world(self, depsgraph) -> None:
-        override = depsgraph.view_layer.world_override
+        shown = depsgraph.view_layer.world_override or depsgraph.scene.original.world
         with reuse():
-            world = read_world(override or depsgraph.scene.original.world, [])
-        self.scene = replace(self.scene, world=world)
+            world = read_world(shown, [])
+        self.scene = replace(self.scene, world=world, mist=read_mist(shown))
 
 
 _live: dict[tuple[str, str], LiveScene] = {}

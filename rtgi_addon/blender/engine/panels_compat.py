@@ -5,10 +5,9 @@ import bpy
 # Those made for EEVEE alone that say what we read, and those made for every engine that they stand in for.
 _FOR_EEVEE = {
     "DATA_PT_EEVEE_light", "DATA_PT_EEVEE_light_shadow", "NODE_DATA_PT_EEVEE_light", "EEVEE_MATERIAL_PT_context_material",
-    "EEVEE_MATERIAL_PT_surface", "EEVEE_WORLD_PT_surface", "DATA_PT_lightprobe_eevee", "DATA_PT_lightprobe_eevee_next",
-    "DATA_PT_lightprobe_bake_resolution",
+    "EEVEE_MATERIAL_PT_surface", "EEVEE_WORLD_PT_surface",
 }
-_REPLACED = {"DATA_PT_light", "NODE_DATA_PT_light"}
+_REPLACED = {"DATA_PT_light", "NODE_DATA_PT_light", "DATA_PT_lightprobe"}
 
 
 def add(engine: str) -> None:

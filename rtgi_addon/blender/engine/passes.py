@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import bpy
 import numpy as np
 
 # What Blender's engines write as the depth of nothing.
@@ -21,6 +22,9 @@ class RenderPass:
     wanted: Callable[[object], bool]
 
 
+# As Cycles calls them.
+_VOLUME = ("Volume Direct", "Volume Indirect") if bpy.app.version >= (5, 0, 0) else ("VolumeDir", "VolumeInd")
+
 PASSES = (
     RenderPass("Combined", "RGBA", "COLOR", "combined", lambda layer: True),
     RenderPass("Depth", "Z", "VALUE", "depth", lambda layer: layer.use_pass_z),
@@ -29,6 +33,11 @@ PASSES = (
     RenderPass("Direct", "RGB", "COLOR", "direct", lambda layer: layer.rtgi.use_direct),
     RenderPass("Indirect", "RGB", "COLOR", "indirect", lambda layer: layer.rtgi.use_indirect),
     RenderPass("Irradiance", "RGB", "COLOR", "irradiance", lambda layer: layer.rtgi.use_irradiance),
+    RenderPass(_VOLUME[0], "RGB", "COLOR", "volume_direct", lambda layer: layer.rtgi.use_volume_direct),
+    RenderPass(_VOLUME[1], "RGB", "COLOR", "volume_indirect", lambda layer: layer.rtgi.use_volume_indirect),
+    RenderPass("Mirror Confidence", "RGB", "COLOR", "mirror_confidence", lambda layer: layer.rtgi.use_mirror_confidence),
+    RenderPass("Mirror Distance", "RGB", "COLOR", "mirror_distance", lambda layer: layer.rtgi.use_mirror_distance),
+    RenderPass("Transmittance", "RGB", "COLOR", "transmittance", lambda layer: layer.rtgi.use_transmittance),
 )
 # Those that every engine's result has without being asked.
 _BUILT_IN = {"Combined"}

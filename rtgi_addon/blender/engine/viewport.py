@@ -1,14 +1,20 @@
 """A viewport: brings its renderer up to date with the scene, draws one sample more, and says what it shows."""
 
 import traceback
+from dataclasses import replace
 
 import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
 
+from ...effects import notes_of
 from ...errors import BakeError
-from ..preview_settings import preview_settings
+from ...scene import Scene, drawn_otherwise
+from ...techniques.transfer.controls import controlled
 from ..session import session
 from ..translations import sentence
+from ..ui.effect_settings import chosen_effects
+from ..ui.light_settings import controls_of
+from ..ui.preview_settings import preview_settings
 from .layer import OverlayLayer
 from .live import LiveScene, live_scene
 from .picture import Picture
@@ -33,6 +39,7 @@ class Viewport:
         self._layer = OverlayLayer()
         self._broken = ""
         self._begun = False
+        self._controlled = None
 
     def __del__(self):
         self.close()
@@ -66,27 +73,39 @@ class Viewport:
         engine.update_stats("RTGI", sentence(self._broken) or self._status(scene, live, shown))
 
     def _frame(self, engine, context, scene, live: LiveScene, shown: Shown) -> None:
-        from ...preview.camera_view import CameraView
         from ...preview.present import present
-        settings = preview_settings(scene, final=False)
+        from ...transport.views.camera import CameraView
+        settings, effects = preview_settings(scene, final=False), chosen_effects(scene)
         region, view = context.region, context.region_data
         seen = CameraView(np.array(view.view_matrix.inverted(), np.float64), np.array(view.window_matrix, np.float64))
         size = region.width, region.height
-        self.picture.frame(live.scene, shown, settings, seen, size)
+        lit = self._lit(live.scene, scene)
+        self.picture.frame(lit, shown, settings, effects, seen, size)
         preview = scene.rtgi_preview
         if preview.compare:
             split = round(preview.split * size[0])
-            self.other.frame(live.scene, shown_for(scene, preview.compare_technique), settings, seen, size)
+            self.other.frame(lit, shown_for(scene, preview.compare_technique), settings, effects, seen, size)
             present(self.picture.texture, size, (0, split))
             present(self.other.texture, size, (split, size[0]))
         else:
             self.other.close()
             present(self.picture.texture, size)
-        overlay = self._layer.draw(scene, shown, seen, size, self.picture.renderer)
+        shows = context.space_data is None or context.space_data.overlay.show_overlays
+        overlay = self._layer.draw(scene, shown, seen, size, self.picture.renderer) if shows else None
         if overlay is not None:
             present(overlay, size)
         if self.unsettled:
             engine.tag_redraw()
+
+    def _lit(self, read: Scene, scene):
+        """``read`` in the light that the sliders of ``scene`` make: the same object as long as both stay."""
+        controls = controls_of(scene)
+        if self._controlled is None or self._controlled[0] is not read or self._controlled[1] != controls:
+            lit = controlled(read, controls)
+            # What is to be followed in another way is another scene to whoever follows it.
+            again = self._controlled is not None and lit is self._controlled[2]
+            self._controlled = read, controls, replace(lit) if again else lit
+        return self._controlled[2]
 
     @property
     def unsettled(self) -> bool:
@@ -105,7 +124,8 @@ class Viewport:
             parts.append(iface_("Relighting"))
         if is_stale(scene, shown):
             parts.append(iface_(STALE))
-        notes = [shown.note, live.error, renderer.error]
+        notes = [shown.note, live.error, renderer.error, *renderer.notes, drawn_otherwise(renderer.scene),
+                 *notes_of(chosen_effects(scene), renderer.scene)]
         if scene.rtgi_preview.compare:
             other = shown_for(scene, scene.rtgi_preview.compare_technique)
             notes.append(other.note and iface_("Right of the line: {note}").format(note=sentence(other.note)))

@@ -1,4 +1,4 @@
-"""Asking Cycles about worlds and materials before a render begins, because during one it cannot be asked (see `remembered`).
+"""Asking Cycles about worlds, materials and lamps before a render begins, because during one it cannot be asked (see `remembered`).
 
 Without a window Blender says in time that a render is about to begin. With one it says so on the render's own thread, where
 nothing may be changed: there the scene is looked after from a timer, whenever it was changed.
@@ -11,12 +11,14 @@ from bpy.app.handlers import persistent
 
 from ...errors import BakeError
 from ..extract import extract_scene
+from ..extract.lamp_nodes import node_factor
 from ..extract.world import read_world
 from ..materials import MaterialReader
 from ..remembered import reuse
 from .engine import ENGINE_ID
 
 _DELAY = 0.5
+_ASKED = (bpy.types.World, bpy.types.Material, bpy.types.Light, bpy.types.NodeTree, bpy.types.Mesh, bpy.types.Scene)
 
 
 @persistent
@@ -31,13 +33,20 @@ def warm_up_after_change(scene, depsgraph) -> None:
     """Something was edited: once the user pauses, have the answers ready for F12."""
     if bpy.app.background or scene.render.engine != ENGINE_ID or bpy.app.is_job_running("RENDER"):
         return
-    if any(isinstance(update.id, (bpy.types.World, bpy.types.Material, bpy.types.NodeTree, bpy.types.Mesh, bpy.types.Scene))
-           and (update.is_updated_shading or update.is_updated_geometry) for update in depsgraph.updates):
+    if any(_may_ask(update) for update in depsgraph.updates):
         _warm_up_in(_DELAY)
 
 
+def _may_ask(update) -> bool:
+    """Whether something may have changed that Cycles is asked about."""
+    if isinstance(update.id, bpy.types.Object):
+        # A lamp's nodes may look at where it stands.
+        return update.id.type == "LIGHT" and update.is_updated_transform
+    return isinstance(update.id, _ASKED) and (update.is_updated_shading or update.is_updated_geometry)
+
+
 def warm_up(scene: bpy.types.Scene) -> None:
-    """Have remembered what Cycles says of the world and the materials of ``scene`` that only it understands."""
+    """Have remembered what Cycles says of the world, the materials and the lamps of ``scene`` that only it understands."""
     try:
         with reuse():
             read_world(scene.world, [])
@@ -50,7 +59,9 @@ def warm_up(scene: bpy.types.Scene) -> None:
 
 
 def _needs_cycles(scene) -> bool:
-    """True if some material that is in use has nodes that only Cycles understands."""
+    """True if some lamp or some material that is in use has nodes that only Cycles understands."""
+    if any(obj.type == "LIGHT" and not obj.hide_render and node_factor(obj.data) is None for obj in scene.objects):
+        return True
     reader = MaterialReader(scene, None)
     used = {slot.material for obj in scene.objects if not obj.hide_render for slot in obj.material_slots if slot.material}
     return any(reader.read(material) is None for material in used)

@@ -1,70 +1,64 @@
-"""What a lamp's shader nodes multiply its power by."""
+"""What a lamp's shader nodes multiply its power by, where that is a constant: read without Cycles.
 
-import bpy
+Maths, colours, groups, mixed and added shaders are read as those of materials are (`materials`). What differs over directions,
+places or distances, and nodes that are not known here, `lamp_tables` has Cycles evaluate.
+"""
+
 import numpy as np
 
-from .sockets import source_of
+from ..materials.circumstances import Ray
+from ..materials.images import ImageCache
+from ..materials.links import by_identifier, follow, nodes_of
+from ..materials.nodes import NodeReader
+from ..materials.shaders import ShaderReader, Surface
+from ..materials.values import Unreadable, Value
 
-NOT_READ = "its nodes are not a plain Emission, so they are not read and it shines with its colour and power alone"
+# Who asks a lamp: a surface that a probe sees.
+ASKING = Ray("light")
 
 
-def node_factor(lamp) -> tuple[np.ndarray, str | None]:
-    """Factor (3,) on the lamp's power from its node tree, and a note where the nodes cannot be read (factor 1 then).
-
-    Read exactly: no nodes, or an Emission with a constant or Blackbody colour and a constant strength (also through Light
-    Falloff's quadratic output, reroutes, Value and RGB nodes).
-    """
-    one = np.ones(3)
-    # From 5.1 lamps always have nodes and asking for the flag warns that it will go.
-    if lamp.node_tree is None or (bpy.app.version < (5, 1, 0) and not lamp.use_nodes):
-        return one, None
-    output = lamp.node_tree.get_output_node("CYCLES")
+def node_factor(lamp) -> np.ndarray | None:
+    """Factor (3,) on the lamp's power from its node tree; None where that is no constant as far as it can be told here."""
+    tree = nodes_of(lamp)
+    if tree is None:
+        return np.ones(3)
+    output = tree.get_output_node("CYCLES")
     if output is None:
-        return np.zeros(3), None
-    source = source_of(output.inputs["Surface"])
-    if source is None:
-        return np.zeros(3), None
-    node = source.node
-    if node.type != "EMISSION" or node.mute:
-        return one, NOT_READ
-    color, strength = _color(node.inputs["Color"]), _strength(node.inputs["Strength"])
-    if color is None or strength is None:
-        return one, NOT_READ
-    return color * strength, None
-
-
-def _color(socket):
-    source = source_of(socket)
-    if source is None:
-        return np.array(socket.default_value[:3])
-    if source.node.type == "RGB":
-        return np.array(source.default_value[:3])
-    if source.node.type == "VALUE":
-        return np.full(3, source.default_value)
-    if source.node.type == "BLACKBODY" and not source.node.inputs["Temperature"].is_linked:
-        return blackbody(source.node.inputs["Temperature"].default_value)
-    return None
-
-
-def _strength(socket):
-    source = source_of(socket)
-    if source is None:
-        return float(socket.default_value)
-    if source.node.type == "VALUE":
-        return float(source.default_value)
-    if source.node.type == "LIGHT_FALLOFF" and source.name == "Quadratic":
-        inputs = source.node.inputs
-        if not inputs["Strength"].is_linked and not inputs["Smooth"].is_linked and inputs["Smooth"].default_value == 0.0:
-            return float(inputs["Strength"].default_value)
-    return None
-
-
-def blackbody(kelvin: float) -> np.ndarray:
-    """Scene-linear colour (3,) of Blender's Blackbody node, which is also that of a lamp's own temperature."""
-    probe = bpy.data.lights.new("rtgi blackbody", "POINT")
+        return np.zeros(3)
     try:
-        probe.use_temperature = True
-        probe.temperature = kelvin
-        return np.array(probe.temperature_color)
-    finally:
-        bpy.data.lights.remove(probe)
+        surface = _LampShader(_LampNodes(ImageCache([], lambda image: None), set(), ASKING)).shader(output.inputs["Surface"], ())
+        emission = surface.emission * surface.alpha
+    except Unreadable:
+        return None
+    return emission.constant.astype(np.float64) if emission.is_constant else None
+
+
+class _LampShader(ShaderReader):
+    """The closures of a lamp, of which only emission counts."""
+
+    def shader(self, socket, path: tuple) -> Surface:
+        """See ShaderReader."""
+        (out, where), _types = follow(socket, path)
+        if out.is_output and out.node.bl_idname not in _CLOSURES:
+            self.unknown(out, where)
+        return super().shader(socket, path)
+
+
+class _LampNodes(NodeReader):
+    """The nodes of a lamp, which has no surface."""
+
+    def output(self, out, path: tuple) -> Value:
+        """See NodeReader."""
+        node = out.node
+        if node.bl_idname == "ShaderNodeLightFalloff" and out.identifier == "Quadratic":
+            if self.value(by_identifier(node.inputs, "Smooth"), path).equals(0.0):
+                return self.value(by_identifier(node.inputs, "Strength"), path)
+        elif node.bl_idname in _DIFFERS or (node.bl_idname == "ShaderNodeLightPath" and out.identifier == "Ray Length"):
+            raise Unreadable(node.label or node.name, f"{node.bl_label} node")
+        return super().output(out, path)
+
+
+_CLOSURES = {"ShaderNodeEmission", "ShaderNodeMixShader", "ShaderNodeAddShader", "ShaderNodeBsdfTransparent"}
+# What has another meaning on a lamp than on a surface.
+_DIFFERS = {"ShaderNodeNewGeometry", "ShaderNodeLayerWeight", "ShaderNodeFresnel", "ShaderNodeVertexColor", "ShaderNodeAttribute",
+            "ShaderNodeTexImage"}

@@ -1,26 +1,21 @@
 """One evaluated bpy mesh as plain triangle arrays, read in bulk."""
 
+import bpy
 import numpy as np
 
 from ...scene import Mesh
-from ..materials import ACTIVE_COLOR
-
-# Components of an attribute's data type, and the property that holds them.
-_ATTRIBUTE_TYPES = {
-    "FLOAT": (1, "value", np.float32), "INT": (1, "value", np.int32), "INT8": (1, "value", np.int32),
-    "BOOLEAN": (1, "value", bool), "FLOAT2": (2, "vector", np.float32), "FLOAT_VECTOR": (3, "vector", np.float32),
-    "FLOAT_COLOR": (4, "color", np.float32), "BYTE_COLOR": (4, "color", np.float32),
-}
+from ..materials.attributes import ACTIVE_COLOR, elements, number_of, source_and_part, weights
 
 
 class MeshReader:
     """Reads one evaluated mesh (``bpy.types.Mesh``). Its arrays are copies and outlive the mesh; the reader itself does not.
 
     ``triangle_slot`` (t,) int32 is each triangle's material slot, ``corner_loops`` (t, 3) int32 the loop of each corner.
+    ``vertex_groups`` are those of the mesh's object: shaders read them as attributes.
     """
 
-    def __init__(self, mesh):
-        self._mesh = mesh
+    def __init__(self, mesh, vertex_groups=()):
+        self._mesh, self._groups = mesh, {group.name: group for group in vertex_groups}
         mesh.calc_loop_triangles()
         count = len(mesh.loop_triangles)
         self.triangles = _bulk(mesh.loop_triangles, "vertices", count, 3, np.int32)
@@ -42,31 +37,36 @@ class MeshReader:
         uv_layers = {layer.name: _bulk(layer.uv, "vector", len(mesh.loops), 2)[self.corner_loops] for layer in mesh.uv_layers}
         active_uv = next((layer.name for layer in mesh.uv_layers if layer.active_render), None)
         return Mesh(name, vertices, self.triangles, self.triangle_slot, self._corner_normals(), uv_layers, active_uv,
-                    self.attributes(attributes))
+                    self.attributes(attributes), self._marked_edges())
+
+    def _marked_edges(self):
+        """Pairs of vertices (e, 2) of the edges marked for Freestyle, None where there are none."""
+        edges = self._mesh.edges
+        marks = self._mesh.attributes.get("freestyle_edge")
+        if marks is not None:
+            marked = _bulk(marks.data, "value", len(edges), 1, bool)[:, 0]
+        elif "use_freestyle_mark" in bpy.types.MeshEdge.bl_rna.properties:
+            marked = _bulk(edges, "use_freestyle_mark", len(edges), 1, bool)[:, 0]
+        else:
+            return None
+        return _bulk(edges, "vertices", len(edges), 2, np.int32)[marked] if marked.any() else None
 
     def attributes(self, names) -> dict[str, np.ndarray]:
-        """Those attributes of ``names`` that the mesh has, as (t, 3, 4) float32 RGBA corners: scalars grey, vectors as RGB,
-        colours scene-linear, alpha 1 where there is none. ``ACTIVE_COLOR`` is the colour attribute active for render."""
-        mesh, found = self._mesh, {}
-        for name in names:
-            source = name
-            if name == ACTIVE_COLOR:
-                index = mesh.color_attributes.render_color_index
-                if not 0 <= index < len(mesh.color_attributes):
-                    continue
-                source = mesh.color_attributes[index].name
-            attribute = mesh.attributes.get(source)
-            corners = self._corner_index(attribute)
-            if corners is None or attribute.data_type not in _ATTRIBUTE_TYPES:
-                continue
-            width, member, dtype = _ATTRIBUTE_TYPES[attribute.data_type]
-            values = _bulk(attribute.data, member, len(attribute.data), width, dtype).astype(np.float32, copy=False)
-            rgba = np.zeros((len(values), 4), np.float32)
-            rgba[:, :3 if width == 1 else width] = values
-            if width < 4:
-                rgba[:, 3] = 1.0
-            found[name] = rgba[corners]
-        return found
+        """Those attributes of ``names`` (see `materials/attributes.py`) that the mesh has, as (t, 3, 4) float32 RGBA corners."""
+        found = {name: self._attribute(name) for name in names}
+        return {name: corners for name, corners in found.items() if corners is not None}
+
+    def _attribute(self, name: str) -> np.ndarray | None:
+        mesh = self._mesh
+        source, part = source_and_part(name)
+        if source == ACTIVE_COLOR:
+            index = mesh.color_attributes.render_color_index
+            source = mesh.color_attributes[index].name if 0 <= index < len(mesh.color_attributes) else ""
+        attribute = mesh.attributes.get(source)
+        if attribute is None and source in self._groups:
+            return number_of(weights(mesh, self._groups[source]), part)[self.triangles]
+        corners, values = self._corner_index(attribute), elements(attribute)
+        return None if corners is None or values is None else number_of(values[0], part, values[1])[corners]
 
     def _corner_index(self, attribute):
         """The element of ``attribute`` at each corner, broadcastable to (t, 3); None where it has no value on corners."""

@@ -10,6 +10,8 @@ import bpy
 from ...errors import BakeError
 
 _ENGINE_ID = "RTGI_EXTRACT"
+# Side of the picture that nobody looks at [pixels].
+_PICTURE_SIDE = 16
 
 
 def read_for_render(scene, view_layer, read):
@@ -62,7 +64,7 @@ def _prepare(scene, layer_name):
     """Make rendering the scene copy cost nothing; return the camera made for it, or None. The render needs one to start."""
     render = scene.render
     render.engine = _ENGINE_ID
-    render.resolution_x = render.resolution_y = 16
+    render.resolution_x = render.resolution_y = _PICTURE_SIDE
     render.resolution_percentage = 100
     for option in ("use_compositing", "use_sequencer", "use_border", "use_motion_blur", "use_multiview", "use_freestyle",
                    "use_persistent_data", "use_stamp"):

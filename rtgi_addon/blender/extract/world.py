@@ -1,10 +1,10 @@
 """The scene's world as radiance from every direction."""
 
-import bpy
 import numpy as np
 
-from ...scene import World
+from ...scene import Mist, World
 from ..fingerprint import node_digest
+from ..materials.links import nodes_of
 from ..remembered import answer
 from .panorama import render_panorama
 from .sockets import source_of
@@ -23,9 +23,10 @@ def read_world(world, notes: list[str]) -> World:
     # Cycles' settings are there only while its add-on is on.
     if world is None or not getattr(getattr(world, "cycles_visibility", None), "diffuse", True):
         return World.constant(0.0)
-    if world.node_tree is None or (bpy.app.version < (5, 0, 0) and not world.use_nodes):
+    tree = nodes_of(world)
+    if tree is None:
         return World.constant(np.array(world.color))
-    output = world.node_tree.get_output_node("CYCLES")
+    output = tree.get_output_node("CYCLES")
     surface = source_of(output.inputs["Surface"]) if output is not None else None
     if surface is None:
         return World.constant(0.0)
@@ -43,6 +44,14 @@ def read_world(world, notes: list[str]) -> World:
                 return found
     panorama = answer(lambda: node_digest(world), lambda: render_panorama(world))
     return World(np.maximum(panorama, 0.0), description="Cycles panorama")
+
+
+def read_mist(world) -> Mist:
+    """A bpy world's mist settings, which need no light of its own; Blender's defaults without a world."""
+    if world is None:
+        return Mist()
+    settings = world.mist_settings
+    return Mist(settings.start, settings.depth, settings.falloff.lower())
 
 
 def _environment(node, strength, notes):

@@ -1,4 +1,6 @@
-"""Blender materials as ``rtgi_addon.scene.Material``: by reading nodes, or by Cycles' own bake where nodes do not suffice.
+"""Blender materials as ``rtgi_addon.scene.Material``: by reading nodes, or by Cycles' own bake where nodes do not suffice. A node
+that can be read exactly comes in with its formula in `nodes` or `shaders`; what cannot stays with the bake, which knows them
+all.
 
 How extraction uses it::
 

@@ -6,6 +6,10 @@ import numpy as np
 PADDING = 2
 # The least texels along a side of a patch: with fewer, a thin polygon may cover no texel's centre and stay unbaked.
 MINIMUM = 3
+# Factor on the scale of patches that did not fit, for the next try.
+_SHRINK = 0.95
+# What lengths are divided by at least.
+_TINY_LENGTH, _TINY_SIZE = 1e-20, 1e-9
 
 
 def polygon_uv(positions: np.ndarray, normals: np.ndarray, starts: np.ndarray, counts: np.ndarray, resolution: int) -> np.ndarray:
@@ -22,7 +26,7 @@ def polygon_uv(positions: np.ndarray, normals: np.ndarray, starts: np.ndarray, c
     edges = positions[following] - positions
     longest = _longest(edges, starts)
     tangent = edges[longest]
-    tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-20)
+    tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), _TINY_LENGTH)
     bitangent = np.cross(normals, tangent)
     flat = np.stack([np.einsum("ij,ij->i", positions, tangent[polygon]), np.einsum("ij,ij->i", positions, bitangent[polygon])], 1)
     low, high = np.minimum.reduceat(flat, starts), np.maximum.reduceat(flat, starts)
@@ -45,7 +49,7 @@ def _fit(size: np.ndarray, resolution: int) -> tuple[np.ndarray, np.ndarray]:
     area, edge = np.sum(size[:, 0] * size[:, 1]), border * np.sum(size)
     free = max(resolution**2 - len(size) * border**2, 1.0)
     scale = (np.sqrt(edge**2 + 4.0 * area * free) - edge) / (2.0 * area) if area > 0 else 1.0  # where all boxes fill the square
-    scale = min(scale, resolution / max(float(size.max()), 1e-9))
+    scale = min(scale, resolution / max(float(size.max()), _TINY_SIZE))
     while True:
         extent = np.maximum(size * scale, MINIMUM)
         corner = _shelves(np.ceil(extent).astype(np.int64) + 2 * PADDING, resolution)
@@ -53,7 +57,7 @@ def _fit(size: np.ndarray, resolution: int) -> tuple[np.ndarray, np.ndarray]:
             return extent, corner
         if extent.max() <= MINIMUM:
             raise ValueError(f"{len(size)} patches do not fit on {resolution}² texels")
-        scale *= 0.95
+        scale *= _SHRINK
 
 
 def _shelves(box: np.ndarray, resolution: int) -> np.ndarray | None:

@@ -6,45 +6,53 @@ corner attributes. The user's scene, selection and materials are never touched; 
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import addon_utils
 import bpy
 import numpy as np
 
 from ...errors import BakeError
+from .answered import answer, answered
 from .atlas import polygon_uv
+from .circumstances import Ray, questions
+from .detail import doubtful_places, doubtful_polygons, magnified, sharpened
 from .nodes import NodeReader
 from .shaders import ShaderReader, Surface
-from .values import ComputedTexture, Mapping, Unreadable, Value
+from .values import ComputedTexture, Mapping, Unreadable, Value, texels
 
 BAKE_UV = "_rtgi_bake"
 # Side of a baked texture by the number of polygons that share it; beyond the last, corners resolve as much as texels would.
 RESOLUTIONS = {1024: 512, 4096: 1024}
 SAMPLES = 4
+# So many polygons of those that bake to corners may have texels as well, on a texture of this side.
+DETAILED, DETAIL_SIDE = 1024, 512
 _MARGIN = 2
 _MOST_UV_MAPS = 8
 _PLACEHOLDER = ComputedTexture("bake", np.ones((1, 1, 3), np.float32), False, "EXTEND")
-_MAPPING = Mapping(BAKE_UV)
+BAKE_MAPPING = Mapping(BAKE_UV)
 
 
 @dataclass(frozen=True)
 class Leaf:
-    """An output socket to bake: the names of the group nodes around it, its node, its identifier, and EMIT or DIFFUSE."""
+    """An output socket to bake: the names of the group nodes around it, its node, its identifier, EMIT or DIFFUSE, and the ray that
+    it is to answer, without what it does not ask of one."""
 
     path: tuple[str, ...]
     node: str
     socket: str
     kind: str
+    ray: Ray
 
 
 class BakedNodes(NodeReader):
-    """Evaluates what is constant, and takes everything else from ``baked``; leaves not in it are collected in ``wanted``."""
+    """Evaluates what is constant for a ray and an object, and takes everything else from ``baked``; leaves not in it are added to
+    ``wanted``, and a placeholder stands for each."""
 
-    def __init__(self, images, baked: dict[Leaf, Value]):
-        super().__init__(images, set())
-        self._plain = NodeReader(images, set())
-        self._baked = baked
-        self.wanted: list[Leaf] = []
+    def __init__(self, images, baked: dict[Leaf, Value], ray: Ray, placed: tuple, wanted: list[Leaf] | None):
+        super().__init__(images, set(), ray, placed)
+        self._plain = NodeReader(images, set(), ray, placed)
+        self._baked, self._wanted = baked, wanted
 
     def output(self, out, path: tuple) -> Value:
         """The value of a node's output: constant, or baked."""
@@ -58,53 +66,90 @@ class BakedNodes(NodeReader):
 
     def leaf(self, out, path: tuple, kind: str) -> Value:
         """The baked value of an output, or a placeholder while leaves are collected."""
-        leaf = Leaf(tuple(node.name for node in path), out.node.name, out.identifier, kind)
-        if leaf not in self._baked and leaf not in self.wanted:
-            self.wanted.append(leaf)
-        return self._baked.get(leaf) or Value(np.ones(3, np.float32), _PLACEHOLDER, mapping=_MAPPING)
+        ray = self.ray.seen_by(questions(out, path))
+        leaf = Leaf(tuple(node.name for node in path), out.node.name, out.identifier, kind, ray)
+        if leaf in self._baked:
+            return self._baked[leaf]
+        if leaf not in self._wanted:
+            self._wanted.append(leaf)
+        return Value(np.ones(3, np.float32), _PLACEHOLDER, mapping=BAKE_MAPPING)
 
 
 class BakedShaders(ShaderReader):
     """Reads closures by formula where there is one, else by their baked diffuse colour and emission."""
 
     def unknown(self, out, path: tuple) -> Surface:
-        """A closure without a formula, as Cycles bakes it."""
+        """A closure without a formula, as Cycles bakes it: of what is no diffuse closure it says black."""
+        self._remark(f"its {out.node.bl_label} has no formula here: the diffuse colour that Cycles bakes of it is taken, which may "
+                     "be black")
         color = self._nodes.leaf(out, path, "DIFFUSE")
         return Surface(color, self._nodes.leaf(out, path, "EMIT"), base_color=color)
 
 
-def wanted_leaves(images, material) -> list[Leaf]:
-    """Every socket that must be baked before the material can be read."""
-    nodes = BakedNodes(images, {})
-    BakedShaders(nodes).surface(material)
-    return nodes.wanted
+class Baked(NamedTuple):
+    """The ``values`` of leaves by slot and the UV map (loops, 2) of their textures; without one the values are 1-row textures whose
+    column is the loop index. ``detail`` has some polygons again, with a UV map, and ``inside`` (loops,) tells which those are."""
+
+    values: dict[int, dict[Leaf, Value]]
+    uv: np.ndarray | None
+    inside: np.ndarray | None = None
+    detail: "Baked | None" = None
 
 
-def bake_leaves(request, leaves: dict[int, list[Leaf]], scene) -> tuple[dict[int, dict[Leaf, Value]], np.ndarray | None]:
-    """Bake the leaves of each slot of a request; returns the values by slot and the (loops, 2) UV map of their textures.
-
-    Without a UV map the values are 1-row textures whose column is the loop index. Raises BakeError if Cycles cannot bake.
-    """
+def bake_leaves(request, leaves: dict[int, list[Leaf]], scene) -> Baked:
+    """Bake the leaves of each slot of a request. Raises BakeError if Cycles cannot bake."""
     _require_cycles(request.name)
     polygons = _polygons_of(request, leaves)
-    uv = None
+    room = len(request.mesh.uv_layers) < _MOST_UV_MAPS
     count = np.count_nonzero(polygons)
-    resolution = next((side for most, side in RESOLUTIONS.items() if count <= most), 0)
-    if resolution and len(request.mesh.uv_layers) < _MOST_UV_MAPS:
-        uv = _unwrapped(request, polygons, resolution)
+    resolution = next((side for most, side in RESOLUTIONS.items() if count <= most), 0) if room else 0
+    uv = _unwrapped(request, polygons, resolution) if resolution else None
+    baked = Baked(_bake(request, leaves, scene, uv, resolution), uv)
+    if uv is not None or not room:
+        return baked
+    starts, areas = _polygons(request.mesh)
+    shining = [texels(value)[0] for values in baked.values.values() for leaf, value in values.items()
+               if leaf.kind == "EMIT" and not value.is_constant]
+    doubtful = [doubtful_polygons(np.where(np.isfinite(corners), corners, 0.0), starts, areas, DETAILED) for corners in shining]
+    chosen = np.zeros(len(starts), bool)
+    for found in doubtful:
+        chosen[found[:DETAILED // len(doubtful)]] = True
+    chosen &= polygons
+    if not chosen.any():
+        return baked
+    uv = _unwrapped(request, chosen, DETAIL_SIDE)
+    inside = np.repeat(chosen, np.diff(np.append(starts, len(request.mesh.loops))))
+    return baked._replace(inside=inside, detail=Baked(_bake(request, leaves, scene, uv, DETAIL_SIDE), uv))
+
+
+def bake_on_corners(request, leaves: dict[int, list[Leaf]], scene) -> dict[int, dict[Leaf, Value]]:
+    """The leaves of each slot of a request at the corners of its mesh: see ``Baked``. Raises BakeError if Cycles cannot bake."""
+    _require_cycles(request.name)
+    return _bake(request, leaves, scene, None, 0)
+
+
+def _bake(request, leaves, scene, uv: np.ndarray | None, resolution: int) -> dict[int, dict[Leaf, Value]]:
     with _Stage(request, scene, uv, resolution) as stage:
-        copies = {slot: stage.copy_of(slot) for slot in leaves}
         result = {slot: {} for slot in leaves}
         for kind in ("EMIT", "DIFFUSE"):
             queues = {slot: [leaf for leaf in wanted if leaf.kind == kind] for slot, wanted in leaves.items()}
             for turn in range(max(map(len, queues.values()), default=0)):
                 active = {slot: queue[turn] for slot, queue in queues.items() if turn < len(queue)}
                 for slot, leaf in active.items():
-                    stage.expose(copies[slot], leaf)
+                    stage.expose(slot, leaf)
                 stage.bake(kind)
-                for slot, leaf in active.items():
-                    result[slot][leaf] = stage.result(slot, f"{request.materials[slot].name}: {leaf.node}")
-    return result, uv
+                for slot, (rgb, filled) in stage.results(kind, list(active)).items():
+                    leaf = active[slot]
+                    result[slot][leaf] = _value(rgb, filled, f"{request.materials[slot].name}: {leaf.node}")
+    return result
+
+
+def _polygons(mesh) -> tuple[np.ndarray, np.ndarray]:
+    """First loop and area (polygons,) of each polygon."""
+    starts, areas = np.empty(len(mesh.polygons), np.int32), np.empty(len(mesh.polygons), np.float32)
+    mesh.polygons.foreach_get("loop_start", starts)
+    mesh.polygons.foreach_get("area", areas)
+    return starts, areas
 
 
 def _polygons_of(request, slots) -> np.ndarray:
@@ -151,6 +196,7 @@ class _Stage:
         self._request, self._source, self._uv, self._resolution = request, scene, uv, resolution
         self._remove: list[tuple] = []
         self._images: dict[int, object] = {}
+        self._copies: dict[tuple[int, Ray], object] = {}
 
     def __enter__(self) -> "_Stage":
         try:
@@ -164,6 +210,9 @@ class _Stage:
         for collection, datablock in reversed(self._remove):
             collection.remove(datablock)
         self._remove.clear()
+        mesh = self._request.mesh
+        if BAKE_UV in mesh.attributes:  # a next stage adds its own
+            mesh.attributes.remove(mesh.attributes[BAKE_UV])
 
     def _own(self, collection, datablock):
         self._remove.append((collection, datablock))
@@ -179,8 +228,8 @@ class _Stage:
         scene.cycles.device = "CPU"
         scene.cycles.samples = SAMPLES
         scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False
+        scene.camera = self._source.camera
         self._object.matrix_world = self._request.world_from_local
-        self._object.color, self._object.pass_index = self._request.color, self._request.pass_index
         if self._uv is not None:
             mesh.uv_layers.new(name=BAKE_UV, do_init=False).uv.foreach_set("vector", self._uv.ravel())
         else:
@@ -206,23 +255,27 @@ class _Stage:
     def _add_target(self, material, slot: int, side: int) -> None:
         if self._uv is None:
             return
-        image = self._own(bpy.data.images, bpy.data.images.new("rtgi bake", side, side, alpha=True, float_buffer=True))
+        if slot not in self._images or self._images[slot].size[0] != side:
+            self._images[slot] = self._own(bpy.data.images, bpy.data.images.new("rtgi bake", side, side, alpha=True,
+                                                                                 float_buffer=True))
         node = material.node_tree.nodes.new("ShaderNodeTexImage")
-        node.image = image
+        node.image = self._images[slot]
         material.node_tree.nodes.active = node
-        self._images[slot] = image
 
-    def copy_of(self, slot: int):
-        """A copy of a slot's material, put in that slot, that ``expose`` may rewire."""
-        copy = self._own(bpy.data.materials, self._request.materials[slot].copy())
-        self._add_target(copy, slot, self._resolution)
-        self._request.mesh.materials[slot] = copy
-        return copy
+    def _copy_of(self, slot: int, ray: Ray):
+        """A copy of a slot's material that answers ``ray``."""
+        if (slot, ray) not in self._copies:
+            copy = self._own(bpy.data.materials, self._request.materials[slot].copy())
+            answer(copy.node_tree, ray, self._request.placed[slot], self._remove)
+            self._add_target(copy, slot, self._resolution)
+            self._copies[slot, ray] = copy
+        return self._copies[slot, ray]
 
-    def expose(self, material, leaf: Leaf) -> None:
-        """Wire a leaf to the material's output, through the groups around it."""
+    def expose(self, slot: int, leaf: Leaf) -> None:
+        """Show a leaf on a slot: wire it to the output of a copy of the material, through the groups around it."""
+        material = self._request.mesh.materials[slot] = self._copy_of(slot, leaf.ray)
         tree = material.node_tree
-        out = self._lifted(tree, leaf.path, leaf.node, leaf.socket)
+        out = self._lifted(tree, leaf.path, slot, leaf)
         for node in tree.nodes:
             if node.bl_idname == "ShaderNodeOutputMaterial":
                 node.is_active_output = False
@@ -235,13 +288,14 @@ class _Stage:
             out = emission.outputs["Emission"]
         tree.links.new(out, end.inputs["Surface"])
 
-    def _lifted(self, tree, path: tuple[str, ...], node: str, socket: str):
-        """The output socket, in ``tree``, that carries a socket from within nested groups (which are copied to be changed)."""
+    def _lifted(self, tree, path: tuple[str, ...], slot: int, leaf: Leaf):
+        """The output socket, in ``tree``, that carries a leaf from within nested groups (which are copied to be changed)."""
         if not path:
-            return next(out for out in tree.nodes[node].outputs if out.identifier == socket)
+            out = next(out for out in tree.nodes[leaf.node].outputs if out.identifier == leaf.socket)
+            return answered(tree, out, leaf.ray, self._request.placed[slot])
         group = tree.nodes[path[0]]
         group.node_tree = inner = self._own(bpy.data.node_groups, group.node_tree.copy())
-        out = self._lifted(inner, path[1:], node, socket)
+        out = self._lifted(inner, path[1:], slot, leaf)
         kind = "NodeSocketShader" if out.type == "SHADER" else "NodeSocketColor"
         entry = inner.interface.new_socket("rtgi bake", in_out="OUTPUT", socket_type=kind)
         end = next(node for node in inner.nodes if node.bl_idname == "NodeGroupOutput" and node.is_active_output)
@@ -266,8 +320,24 @@ class _Stage:
             raise BakeError(f"Cycles could not bake the materials of '{self._request.name}' ({str(error).strip()})",
                             "simplify their nodes, or apply the object's modifiers and try again") from error
 
-    def result(self, slot: int, name: str) -> Value:
-        """What the last bake left for a slot; constant if it is the same everywhere."""
+    def results(self, kind: str, slots: list[int]) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+        """What the last bake left for each of ``slots``: values (h, w, 3), and which of them (h, w) are known. Where a texture does
+        not know the sum of its light well enough, some of it is baked again, finer."""
+        found = {slot: self._pixels(slot) for slot in slots}
+        if self._uv is None:
+            return found
+        places = {slot: doubtful_places(*pixels, SAMPLES) for slot, pixels in found.items()}
+        layer = self._request.mesh.uv_layers[BAKE_UV].uv
+        for place in sorted(set().union(*places.values())):
+            layer.foreach_set("vector", magnified(self._uv, place).ravel())
+            self.bake(kind)
+            for slot in slots:
+                if place in places[slot]:
+                    found[slot] = (sharpened(*found[slot], place, *self._pixels(slot)), found[slot][1])
+        layer.foreach_set("vector", self._uv.ravel())
+        return found
+
+    def _pixels(self, slot: int) -> tuple[np.ndarray, np.ndarray]:
         if self._uv is None:
             layer = self._request.mesh.color_attributes[BAKE_UV]
             pixels = np.empty(len(layer.data) * 4, np.float32)
@@ -282,11 +352,16 @@ class _Stage:
             image.pixels.foreach_get(pixels)
             pixels = pixels.reshape(image.size[1], image.size[0], 4)
             filled = pixels[..., 3] > 0.0
-        seen = pixels[filled][:, :3]
-        if len(seen) and np.ptp(seen, axis=0).max() <= 1e-5 * max(1.0, float(np.abs(seen).max())):
-            return Value.of(seen.mean(axis=0, dtype=np.float64))
-        rgb = pixels[..., :3].copy() if self._uv is None else filled_in(pixels[..., :3], filled)
-        return Value(np.ones(3, np.float32), ComputedTexture(name, rgb, False, "EXTEND"), mapping=_MAPPING)
+        return pixels[..., :3].copy(), filled
+
+
+def _value(rgb: np.ndarray, filled: np.ndarray, name: str) -> Value:
+    """What a bake left; constant if it is the same everywhere. ``rgb`` (1, loops, 3) or (side, side, 3)."""
+    seen = rgb[filled]
+    if len(seen) and np.ptp(seen, axis=0).max() <= 1e-5 * max(1.0, float(np.abs(seen).max())):
+        return Value.of(seen.mean(axis=0, dtype=np.float64))
+    rgb = rgb if len(rgb) == 1 else filled_in(rgb, filled)
+    return Value(np.ones(3, np.float32), ComputedTexture(name, rgb, False, "EXTEND"), mapping=BAKE_MAPPING)
 
 
 def filled_in(rgb: np.ndarray, known: np.ndarray) -> np.ndarray:

@@ -1,36 +1,41 @@
 """Follow links and evaluate colour and value nodes as far as a ``Value`` can hold them."""
 
-import math
 from itertools import pairwise
 
 import bpy
 import numpy as np
 from mathutils import Euler
 
+from . import fresnel
+from .attributes import ACTIVE_COLOR, number_of, part_of
+from .circumstances import Ray
 from .images import LINEAR_SPACES, ImageCache, is_missing
+from .links import by_identifier, follow
+from .operations import blended, calculated, converted
 from .values import Mapping, Unreadable, Value, apply
 
-# The name under which a mesh carries whichever colour attribute is active for render.
-ACTIVE_COLOR = "_rtgi_active_color"
+# Attributes that meshes have in Cycles without carrying them.
+_STANDARD_ATTRIBUTES = {"generated", "N", "Pn", "uv", "tangent", "pointiness", "random_per_island"}
 _MAXIMUM_DEPTH = 100
 
 
 class NodeReader:
-    """Evaluates the sockets of one material.
+    """Evaluates the sockets of one material, as they answer one ``ray`` on one object.
 
     A ``path`` is the tuple of group nodes one is inside of. ``images`` is shared by all materials; ``attributes`` collects the
-    names of the mesh attributes that values refer to.
+    names of the mesh attributes that values refer to; ``placed`` are the object's answers (see ``Placements``).
     """
 
-    def __init__(self, images: ImageCache, attributes: set[str]):
+    def __init__(self, images: ImageCache, attributes: set[str], ray: Ray | None = None, placed: tuple = ()):
         self._images = images
         self._attributes = attributes
+        self.ray, self._placed = ray or Ray(), dict(placed)
         self._values: dict[tuple, Value] = {}
         self._depth = 0
 
     def value(self, socket, path: tuple) -> Value:
         """What an input socket receives: a number (three equal components) for value sockets, else a colour or vector."""
-        (found, where), types = self.follow(socket, path)
+        (found, where), types = follow(socket, path)
         value = self._remembered(found, where) if found.is_output else default_value(found)
         for before, after in pairwise(types):
             value = converted(value, before, after)
@@ -49,34 +54,6 @@ class NodeReader:
                 self._depth -= 1
         return self._values[key]
 
-    def follow(self, socket, path: tuple):
-        """((socket, path), types): the output that feeds an input, or the unlinked input whose default counts, seen through
-        reroutes, muted nodes and groups. ``types`` are the socket types passed on the way, from the source to the input."""
-        types = [socket.type]
-        while True:
-            link = next((link for link in socket.links if link.is_valid and not link.is_muted), None)
-            if link is None:
-                return (socket, path), types[::-1]
-            out, node = link.from_socket, link.from_node
-            types.append(out.type)
-            if node.mute:
-                inside = next((inner.from_socket for inner in node.internal_links if inner.to_socket == out), None)
-                # From 5.0 a muted node that nothing enters counts as no link: the input keeps its own value.
-                if inside is None or not (inside.is_linked or bpy.app.version < (5, 0)):
-                    return (socket, path), types[-2::-1]
-                socket = inside
-            elif node.bl_idname == "NodeReroute":
-                socket = node.inputs[0]
-            elif node.bl_idname == "ShaderNodeGroup":
-                end = _group_output(node.node_tree)
-                socket = _Nothing(out.type) if end is None else _by_identifier(end.inputs, out.identifier)
-                path = (*path, node)
-            elif node.bl_idname == "NodeGroupInput" and path:
-                socket, path = _by_identifier(path[-1].inputs, out.identifier), path[:-1]
-            else:
-                return (out, path), types[::-1]
-            types.append(socket.type)
-
     def output(self, out, path: tuple) -> Value:
         """The value of a node's output. Raises Unreadable for nodes outside the supported set."""
         node = out.node
@@ -94,7 +71,7 @@ class NodeReader:
 
     def _coordinates(self, socket, path: tuple) -> tuple[str | None, np.ndarray]:
         """(uv map, (3, 3)): coordinates x, y, z as an affine function of (u, v, 1)."""
-        (out, where), _types = self.follow(socket, path)
+        (out, where), _types = follow(socket, path)
         identity = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]])
         if not out.is_output:
             if getattr(out.node, "bl_idname", "") == "ShaderNodeTexImage":
@@ -130,6 +107,8 @@ class NodeReader:
             raise Unreadable(name, f"{image.source.lower()} image '{image.name}'")
         if node.projection != "FLAT":
             raise Unreadable(name, f"{node.projection.lower()} projection")
+        if self._images.is_for_cycles(image):
+            raise Unreadable(name, f"image '{image.name}', which Cycles reads otherwise than Blender")
         space = image.colorspace_settings
         if not is_missing(image) and not (image.is_float or space.is_data or space.name == "sRGB" or space.name in LINEAR_SPACES):
             raise Unreadable(name, f"image '{image.name}' in colour space {space.name}")
@@ -149,21 +128,54 @@ class NodeReader:
         return Value(np.ones(3, np.float32), attribute=name)
 
     def _color_attribute(self, node, out, _path) -> Value:
-        if out.name != "Color":
-            raise Unreadable(node.label or node.name, "alpha of a colour attribute")
-        return self._attribute(node.layer_name or ACTIVE_COLOR)
+        return self._attribute(part_of(node.layer_name or ACTIVE_COLOR, out.identifier))
 
     def _any_attribute(self, node, out, _path) -> Value:
-        if node.attribute_type != "GEOMETRY" or out.name == "Alpha":
-            raise Unreadable(node.label or node.name, f"{out.name} of a {node.attribute_type.lower()} attribute")
-        value = self._attribute(node.attribute_name)
-        return value if out.name != "Fac" else value.luminance()
+        name = node.attribute_name
+        if node.attribute_type != "GEOMETRY":
+            rgba = np.array(self._placement(node, ("attribute", node.attribute_type, name)), np.float32)
+            return Value.of(number_of(rgba, out.identifier)[:3])
+        if name in _STANDARD_ATTRIBUTES:
+            raise Unreadable(node.label or node.name, f"attribute '{name}'")
+        return self._attribute(part_of(name, out.identifier))
+
+    def _placement(self, node, question: tuple) -> tuple:
+        """What the object answers. Raises Unreadable where no object is known."""
+        if question not in self._placed:
+            raise Unreadable(node.label or node.name, f"{node.bl_label} node")
+        return self._placed[question]
+
+    def _object_info(self, node, out, _path) -> Value:
+        answer = self._placement(node, ("object", out.identifier))
+        return Value.of(answer[0] if len(answer) == 1 else answer)
+
+    def _particle_info(self, node, out, _path) -> Value:
+        answer = self._placement(node, ("particle", out.identifier))
+        return Value.of(answer[0] if len(answer) == 1 else answer[:3])
+
+    def _geometry(self, node, out, _path) -> Value:
+        if out.identifier == "Backfacing":
+            return Value.of(float(self.ray.back))
+        raise Unreadable(node.label or node.name, f"{out.identifier} of a {node.bl_label} node")
+
+    def _layer_weight(self, node, out, path) -> Value:
+        blend = self.value(node.inputs["Blend"], path)
+        if out.identifier == "Facing":
+            return apply(lambda b: fresnel.facing(b, self._cosine), blend)
+        return apply(lambda b: fresnel.layer_weight(b, self._cosine, self.ray.back), blend)
+
+    def _fresnel(self, node, _out, path) -> Value:
+        return apply(lambda ior: fresnel.dielectric_seen(ior, self._cosine, self.ray.back), self.value(node.inputs["IOR"], path))
+
+    @property
+    def _cosine(self) -> float:
+        return 1.0 if self.ray.cosine is None else self.ray.cosine
 
     def _mix(self, node, _out, path) -> Value:
         suffix = {"FLOAT": "Float", "VECTOR": "Vector", "RGBA": "Color"}.get(node.data_type)
         if suffix is None or (node.data_type == "VECTOR" and node.factor_mode != "UNIFORM"):
             raise Unreadable(node.label or node.name, f"mix of {node.data_type.lower()}")
-        factor, a, b = (self.value(_by_identifier(node.inputs, identifier), path)
+        factor, a, b = (self.value(by_identifier(node.inputs, identifier), path)
                         for identifier in ("Factor_Float", f"A_{suffix}", f"B_{suffix}"))
         blend = node.blend_type if node.data_type == "RGBA" else "MIX"
         result = blended(node, blend, factor.clamped() if node.clamp_factor else factor, a, b)
@@ -253,102 +265,6 @@ def default_value(socket) -> Value:
     return Value.of(value if isinstance(value, (int, float)) else tuple(value)[:3])
 
 
-def converted(value: Value, before: str, after: str) -> Value:
-    """Blender's implicit conversion between socket types."""
-    scalar = ("VALUE", "INT", "BOOLEAN")
-    if after in scalar and before == "RGBA":
-        return value.luminance()
-    if after in scalar and before == "VECTOR":
-        return apply(lambda x: np.broadcast_to(x.mean(axis=-1, keepdims=True), x.shape), value)
-    return value
-
-
-def blended(node, blend: str, factor: Value, a: Value, b: Value) -> Value:
-    """Mix by a factor; MIX, MULTIPLY, ADD and SUBTRACT."""
-    if factor.equals(0.0):
-        return a
-    if blend == "MIX":
-        if a.is_constant and b.is_constant:
-            return a + (b - a) * factor
-        return a * (1.0 - factor) + b * factor
-    if blend == "MULTIPLY":
-        return a * b if factor.equals(1.0) else a * (1.0 - factor + b * factor)
-    if blend == "ADD":
-        return a + b * factor
-    if blend == "SUBTRACT":
-        return a - b * factor
-    raise Unreadable(node.label or node.name, f"blend mode {blend.lower()}")
-
-
-def calculated(node, operands: list[Value]) -> Value:
-    """A Math node."""
-    operation = node.operation
-    a, b = operands[0], operands[1] if len(operands) > 1 else Value.of(0.0)
-    if operation == "ADD":
-        return a + b
-    if operation == "SUBTRACT":
-        return a - b
-    if operation == "MULTIPLY":
-        return a * b
-    if operation == "MULTIPLY_ADD":
-        return a * b + operands[2]
-    if operation == "DIVIDE" and b.is_constant:
-        return a * (1.0 / float(b.constant[0]) if b.constant[0] else 0.0)
-    if operation in ("GREATER_THAN", "LESS_THAN") and (a.is_constant or b.is_constant):
-        above = (operation == "GREATER_THAN") == b.is_constant
-        value, threshold = (a, b) if b.is_constant else (b, a)
-        return value.greater_than(float(threshold.constant[0]), above)
-    if operation == "ROUND" and a.texture is not None and a.texture.pixels.dtype == np.uint8 and a.clamped() is a:
-        return a.greater_than(math.nextafter(0.5, 0.0))
-    function = _MATH.get(operation)
-    if function is None:
-        raise Unreadable(node.label or node.name, f"{operation.lower().replace('_', ' ')} of values")
-    return apply(function, *operands)
-
-
-def quotient(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """a / b, 0 where b is 0, as the Divide node."""
-    a, b = np.broadcast_arrays(a, b)
-    return np.divide(a, b, out=np.zeros(a.shape, np.float32), where=b != 0)
-
-
-_MATH = {
-    "DIVIDE": quotient,
-    "GREATER_THAN": lambda a, b: (a > b).astype(np.float32),
-    "LESS_THAN": lambda a, b: (a < b).astype(np.float32),
-    "POWER": lambda a, b: np.where((a >= 0) | (b == np.rint(b)), np.power(np.maximum(a, 0), b), 0),
-    "SQRT": lambda a: np.sqrt(np.maximum(a, 0)),
-    "ABSOLUTE": np.abs,
-    "MINIMUM": np.minimum,
-    "MAXIMUM": np.maximum,
-    "ROUND": lambda a: np.floor(a + 0.5),
-    "FLOOR": np.floor,
-    "CEIL": np.ceil,
-}
-
-
-class _Nothing:
-    """Stands for the input of a muted or empty node that lets nothing through."""
-
-    is_output = False
-    default_value = 0.0
-    links = ()
-    node = None
-
-    def __init__(self, kind: str):
-        self.type = kind
-
-
-def _group_output(tree):
-    """The active output node of a group's tree, or None."""
-    nodes = () if tree is None else tree.nodes
-    return next((node for node in nodes if node.bl_idname == "NodeGroupOutput" and node.is_active_output), None)
-
-
-def _by_identifier(sockets, identifier: str):
-    return next(socket for socket in sockets if socket.identifier == identifier)
-
-
 def _mapping_matrix(location, rotation, scale, kind: str, before: np.ndarray) -> np.ndarray:
     """(3, 3): a Mapping node after the coordinates ``before``."""
     turn = np.array(Euler(rotation, "XYZ").to_matrix())
@@ -368,6 +284,12 @@ _READERS = {
     "ShaderNodeTexImage": NodeReader._image,
     "ShaderNodeVertexColor": NodeReader._color_attribute,
     "ShaderNodeAttribute": NodeReader._any_attribute,
+    "ShaderNodeObjectInfo": NodeReader._object_info,
+    "ShaderNodeParticleInfo": NodeReader._particle_info,
+    "ShaderNodeLightPath": lambda self, node, out, path: Value.of(self.ray.light_path(out.identifier)),
+    "ShaderNodeNewGeometry": NodeReader._geometry,
+    "ShaderNodeLayerWeight": NodeReader._layer_weight,
+    "ShaderNodeFresnel": NodeReader._fresnel,
     "ShaderNodeRGB": lambda self, node, out, path: default_value(out),
     "ShaderNodeValue": lambda self, node, out, path: default_value(out),
     "ShaderNodeMix": NodeReader._mix,

@@ -1,21 +1,33 @@
 """Follow shader links and boil every closure down to what diffuse transport knows: albedo, emission, coverage."""
 
 from dataclasses import dataclass, field, replace
+from operator import add
 
+import bpy
 import numpy as np
 
-from . import albedo
-from .nodes import NodeReader, quotient
-from .values import LUMINANCE, Unreadable, Value, apply
+from . import albedo, measured
+from .links import follow
+from .nodes import NodeReader
+from .operations import quotient
+from .values import Unreadable, Value, apply
 
 # Light added to a see-through surface (Add Shader of Transparent and Emission) needs something to be emitted from.
 GLOW_COVERAGE = 0.05
+# And what reflects, varying over the surface, covers so much of what all rays pass.
+VARYING_COVERAGE = 0.5
+# What Blender's sockets hold when a node is added, where a node lacks one.
+_DEFAULT_COLOR, _DEFAULT_ROUGHNESS, _DEFAULT_IOR, _DEFAULT_LEVEL, _DEFAULT_SIZE = 0.8, 0.5, 1.5, 0.5, 0.5
+STRAIGHT = ("light passes its glass straight on (refraction and caustics are not followed), and that of lamps without a size not "
+            "at all, as in Cycles")
 _BLACK, _WHITE = Value.of(0.0), Value.of(1.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """``alpha`` is the share of rays that meet the surface at all; ``albedo`` and ``emission`` are those of that share."""
+    """``alpha`` is the share of rays that meet the surface at all; ``albedo``, ``emission`` and ``translucency`` (what it lets
+    through diffusely) are those of that share, ``tint`` is the colour of what passes straight on; ``glass`` bounds what bends
+    light, and passes only the share ``clear`` of rays unbent (None: all that pass)."""
 
     albedo: Value = _BLACK
     emission: Value = _BLACK
@@ -24,11 +36,23 @@ class Surface:
     metallic: Value = _BLACK
     roughness: Value = field(default_factory=lambda: Value.of(1.0))
     specular: Value = _BLACK
+    tint: Value = _WHITE
+    translucency: Value = _BLACK
+    glass: bool = False
+    clear: Value | None = None
+
+    @property
+    def transparency(self) -> Value:
+        """The share of all rays that pass without being bent."""
+        return 1.0 - self.alpha if self.clear is None else self.clear
 
 
 def default_surface() -> Surface:
-    """What Cycles from 5.0 on gives a mesh without a material: a Principled BSDF as it is when it is added, gloss included."""
-    base, roughness, reflectance = 0.8, 0.5, albedo.reflectance_from_ior(1.5)
+    """What Cycles gives a mesh without a material: from 5.0 on a Principled BSDF as it is when it is added, gloss included; before,
+    a diffuse surface of the same colour."""
+    if bpy.app.version < (5, 0):
+        return Surface(Value.of(_DEFAULT_COLOR), base_color=Value.of(_DEFAULT_COLOR))
+    base, roughness, reflectance = _DEFAULT_COLOR, _DEFAULT_ROUGHNESS, albedo.reflectance_from_ior(_DEFAULT_IOR)
     specular = albedo.dielectric_specular(roughness, reflectance)
     return Surface(Value.of(base * (1.0 - specular) + specular), base_color=Value.of(base), roughness=Value.of(roughness),
                    specular=Value.of(reflectance))
@@ -52,7 +76,7 @@ class ShaderReader:
 
     def shader(self, socket, path: tuple) -> Surface:
         """The closure that feeds a shader input; nothing linked is black, as in Cycles."""
-        (out, where), _types = self._nodes.follow(socket, path)
+        (out, where), _types = follow(socket, path)
         if not out.is_output:
             return Surface()
         reader = _READERS.get(out.node.bl_idname)
@@ -88,40 +112,79 @@ class ShaderReader:
         base = self._input(node, "Base Color", path)
         metallic = self._input(node, "Metallic", path).clamped()
         transmission = self._input(node, "Transmission Weight", path).clamped()
-        roughness = self._number(node, "Roughness", path, 0.5)
-        level = 2.0 * self._number(node, "Specular IOR Level", path, 0.5)
-        f0 = albedo.reflectance_from_ior(self._number(node, "IOR", path, 1.5)) * level
+        roughness, ior = self._number(node, "Roughness", path, _DEFAULT_ROUGHNESS), self._number(node, "IOR", path, _DEFAULT_IOR)
+        # A level of a half is what the index of refraction says.
+        f0 = albedo.reflectance_from_ior(ior) * 2.0 * self._number(node, "Specular IOR Level", path, _DEFAULT_LEVEL)
         normal_reflectance = f0 * np.clip(self._tint(node, path), 0.0, 1.0)
         specular = albedo.dielectric_specular(roughness, normal_reflectance)
         multiple = node.distribution == "MULTI_GGX"
-        if self._number(node, "Sheen Weight", path) > 0.0:
-            self._remark("its sheen is left out")
         self._shape_of_reflection(node, self._number(node, "Diffuse Roughness", path))
 
-        reflected = base * (1.0 - specular) + Value.of(specular)
-        passed = _BLACK
+        wall = self._number(node, "Thin Wall", path) > 0.5
+        through = self._through(node, path) if wall else 0.0
+        reflected = base * ((1.0 - through) * (1.0 - specular)) + Value.of(specular)
+        translucency = base * (through * (1.0 - specular))
+        covered, tint = _WHITE, _WHITE
         if not transmission.equals(0.0):
-            self._remark("rays pass straight through it, uncoloured, where it transmits")
-            passed = transmission * apply(lambda b, s: _grey(np.sqrt(np.maximum(b, 0.0)) * (1.0 - s)), base, Value.of(specular))
-            reflected = reflected * (1.0 - transmission) + transmission * Value.of(specular)
+            covered, tint, glass = self._glassy(base, specular, ior, wall)
+            covered = 1.0 - transmission * (1.0 - covered) * (1.0 - metallic)
+            reflected = reflected * (1.0 - transmission) + transmission * glass
+            translucency = translucency * (1.0 - transmission)
         if not metallic.equals(0.0):
-            conductor = apply(lambda b: albedo.metal(b, roughness, multiple), base)
+            conductor = apply(lambda color: albedo.metal(color, roughness, multiple), base)
             reflected = reflected * (1.0 - metallic) + conductor * metallic
-            passed = passed * (1.0 - metallic)
+            translucency = translucency * (1.0 - metallic)
         emission = self._input(node, "Emission Color", path) * self._input(node, "Emission Strength", path)
+        weight = self._number(node, "Sheen Weight", path)
+        if weight > 0.0:
+            cover = np.clip(self._mean_color(node, "Sheen Tint", path), 0.0, 1.0)
+            sheen = weight * cover * measured.sheen(self._number(node, "Sheen Roughness", path, _DEFAULT_ROUGHNESS))
+            left = 1.0 - float(sheen.max())
+            reflected, emission, translucency = reflected * left + Value.of(sheen), emission * left, translucency * left
+            covered = 1.0 - (1.0 - covered) * left
         coat = self._number(node, "Coat Weight", path)
         if coat > 0.0:
-            f0 = albedo.reflectance_from_ior(self._number(node, "Coat IOR", path, 1.5))
+            f0 = albedo.reflectance_from_ior(self._number(node, "Coat IOR", path, _DEFAULT_IOR))
             gloss = coat * albedo.dielectric_specular(self._number(node, "Coat Roughness", path), f0)
             reflected, emission = reflected * (1.0 - gloss) + Value.of(gloss), emission * (1.0 - gloss)
-        covered = 1.0 - passed
+            translucency, covered = translucency * (1.0 - gloss), 1.0 - (1.0 - covered) * (1.0 - float(gloss.mean()))
+        alpha = covered * self._input(node, "Alpha", path, 1.0).clamped()
+        if alpha is not covered and not tint.equals(1.0):
+            whole = self._input(node, "Alpha", path, 1.0).clamped()
+            tint = ratio((1.0 - covered) * tint * whole + (1.0 - whole), 1.0 - alpha)
         return Surface(
-            _ratio(reflected, covered), _ratio(emission, covered), covered * self._input(node, "Alpha", path, 1.0).clamped(),
-            base, metallic, self._preview(node, "Roughness", path, 0.5), Value.of(normal_reflectance).clamped())
+            ratio(reflected, covered), ratio(emission, covered), alpha, base, metallic,
+            self._preview(node, "Roughness", path, _DEFAULT_ROUGHNESS), Value.of(normal_reflectance).clamped(), tint,
+            ratio(translucency, covered), not transmission.equals(0.0),
+            None if transmission.equals(0.0) else 1.0 - self._input(node, "Alpha", path, 1.0).clamped())
+
+    def _through(self, node, path: tuple) -> float:
+        """Share of what a thin wall scatters that leaves on the other side: half of it, or more the more it scatters forwards."""
+        weight = self._number(node, "Subsurface Weight", path)
+        return weight * 0.5 * (1.0 + self._number(node, "Subsurface Anisotropy", path))
+
+    def _glassy(self, base: Value, specular: np.ndarray, ior: float, wall: bool) -> tuple[Value, Value, Value]:
+        """Coverage of glass of colour ``base`` that reflects ``specular`` (3,) from outside, the tint of what passes, and the
+        reflectance of the whole."""
+        self._remark(STRAIGHT)
+        if wall:
+            reflected, passed = (apply(lambda color, way=way: albedo.thin_wall(color, ior)[way], base) for way in (0, 1))
+            covered = apply(lambda color: np.repeat(color.max(axis=-1, keepdims=True), 3, axis=-1), reflected)
+            return covered, ratio(passed, 1.0 - covered), reflected
+        seen = self._of_side(specular, ior)
+        return Value.of(float(seen.mean())), apply(lambda color: np.sqrt(np.clip(color, 0.0, 1.0)), base), Value.of(seen)
+
+    def _of_side(self, specular: np.ndarray, ior: float) -> np.ndarray:
+        """What glass reflects (3,) to the side that is asked about; the back lies inside it."""
+        inside = self._nodes.ray.back if ior >= 1.0 else not self._nodes.ray.back
+        return albedo.inside_reflectance(specular, ior) if inside else specular
 
     def _tint(self, node, path: tuple) -> np.ndarray:
+        return self._mean_color(node, "Specular Tint", path)
+
+    def _mean_color(self, node, name: str, path: tuple) -> np.ndarray:
         try:
-            return self._input(node, "Specular Tint", path, 1.0).mean()
+            return self._input(node, name, path, 1.0).mean()
         except Unreadable:
             return np.ones(3, np.float32)
 
@@ -138,41 +201,50 @@ class ShaderReader:
         if node.inputs["Normal"].is_linked:
             self._remark("its bumps are left out")
 
+    def _toon(self, node, path: tuple) -> Surface:
+        self._remark("its light and dark are evened out: it reflects as much of even light as in Cycles")
+        share = measured.toon(self._number(node, "Size", path, _DEFAULT_SIZE), self._number(node, "Smooth", path))
+        color = self._input(node, "Color", path)
+        return Surface(color * share, base_color=color)
+
+    def _sheen(self, node, path: tuple) -> Surface:
+        color = self._input(node, "Color", path)
+        return Surface(color * measured.sheen(self._number(node, "Roughness", path, _DEFAULT_ROUGHNESS), node.distribution),
+                       base_color=color)
+
     def _translucent(self, node, path: tuple) -> Surface:
-        self._remark("its translucency is treated as reflection")
-        return self._diffuse(node, path)
+        color = self._input(node, "Color", path)
+        self._shape_of_reflection(node, 0.0)
+        return Surface(base_color=color, translucency=color)
 
     def _glossy(self, node, path: tuple) -> Surface:
-        color, roughness = self._input(node, "Color", path), self._number(node, "Roughness", path, 0.5)
+        color, roughness = self._input(node, "Color", path), self._number(node, "Roughness", path, _DEFAULT_ROUGHNESS)
         multiple = node.distribution == "MULTI_GGX"
-        reflected = apply(lambda c: albedo.metal(c, roughness, multiple, edge=False), color)
+        reflected = apply(lambda color: albedo.metal(color, roughness, multiple, edge=False), color)
         return Surface(reflected, base_color=color, metallic=_WHITE,
-                       roughness=self._preview(node, "Roughness", path, 0.5))
+                       roughness=self._preview(node, "Roughness", path, _DEFAULT_ROUGHNESS))
 
     def _metallic(self, node, path: tuple) -> Surface:
         if node.fresnel_type == "PHYSICAL_CONDUCTOR":
-            n, k = self._input(node, "IOR", path), self._input(node, "Extinction", path)
-            color = apply(lambda n, k: ((n - 1) ** 2 + k**2) / np.maximum((n + 1) ** 2 + k**2, 1e-9), n, k)
+            # The complex index n + ik.
+            index, extinction = self._input(node, "IOR", path), self._input(node, "Extinction", path)
+            color = apply(lambda n, k: ((n - 1) ** 2 + k**2) / np.maximum((n + 1) ** 2 + k**2, 1e-9), index, extinction)
         else:
             color = self._input(node, "Base Color", path)
-        roughness, multiple = self._number(node, "Roughness", path, 0.5), node.distribution == "MULTI_GGX"
-        return Surface(apply(lambda c: albedo.metal(c, roughness, multiple), color), base_color=color, metallic=_WHITE,
-                       roughness=self._preview(node, "Roughness", path, 0.5))
+        roughness, multiple = self._number(node, "Roughness", path, _DEFAULT_ROUGHNESS), node.distribution == "MULTI_GGX"
+        return Surface(apply(lambda color: albedo.metal(color, roughness, multiple), color), base_color=color, metallic=_WHITE,
+                       roughness=self._preview(node, "Roughness", path, _DEFAULT_ROUGHNESS))
 
     def _glass(self, node, path: tuple) -> Surface:
-        self._remark("rays pass straight through it, uncoloured, where it transmits")
-        color = self._input(node, "Color", path)
-        f0 = albedo.reflectance_from_ior(self._number(node, "IOR", path, 1.5))
-        specular = albedo.dielectric_specular(self._number(node, "Roughness", path), f0)
-        specular = specular if node.bl_idname == "ShaderNodeBsdfGlass" else np.zeros(3, np.float32)
-        covered = 1.0 - apply(lambda c: _grey(c * (1.0 - specular)), color)
-        return Surface(_ratio(color * Value.of(specular), covered), _BLACK, covered, color)
+        color, ior = self._input(node, "Color", path), self._number(node, "IOR", path, _DEFAULT_IOR)
+        specular = albedo.dielectric_specular(self._number(node, "Roughness", path), albedo.reflectance_from_ior(ior))
+        reflects = node.bl_idname == "ShaderNodeBsdfGlass"
+        self._remark(STRAIGHT)
+        covered = Value.of(self._of_side(specular if reflects else np.zeros(3, np.float32), ior))
+        return Surface(color if reflects else _BLACK, _BLACK, covered, color, tint=color.clamped(), glass=True, clear=_BLACK)
 
     def _transparent(self, node, path: tuple) -> Surface:
-        color = self._input(node, "Color", path)
-        if not (color.is_constant and np.ptp(color.constant) < 1e-6):
-            self._remark("what it lets through is not coloured")
-        return Surface(alpha=1.0 - color.luminance())
+        return Surface(alpha=_BLACK, tint=self._input(node, "Color", path).clamped())
 
     def _emission(self, node, path: tuple) -> Surface:
         return Surface(emission=self._input(node, "Color", path) * self._input(node, "Strength", path))
@@ -192,42 +264,68 @@ class ShaderReader:
 
 def mixed(factor: Value, first: Surface, second: Surface) -> Surface:
     """Mix Shader: ``second`` by ``factor``."""
-    if first.alpha.equals(0.0) and not _glows(first):
-        return _covering(second, factor * second.alpha)
-    if second.alpha.equals(0.0) and not _glows(second):
-        return _covering(first, (1.0 - factor) * first.alpha)
-    return _weighted(1.0 - factor, first, factor, second, lambda a, b: a + b)
+    for clear, other, share in ((first, second, factor), (second, first, 1.0 - factor)):
+        # Coverage that is cut at a threshold must stay as it is.
+        if clear.alpha.equals(0.0) and not _glows(clear) and (other.alpha.equals(1.0) or _clear(clear, other)):
+            return replace(other, alpha=share * other.alpha, tint=clear.tint,
+                           **_bending((1.0 - share, clear), (share, other)))
+    return _weighted((1.0 - factor, first), (factor, second), coverage=add)
 
 
 def added(first: Surface, second: Surface) -> Surface:
     """Add Shader: reflection, emission and transparency add up."""
-    return _weighted(_WHITE, first, _WHITE, second, lambda a, b: (a + b - 1.0).clamped())
+    return _weighted((_WHITE, first), (_WHITE, second), coverage=lambda first, second: (first + second - 1.0).clamped())
 
 
-def _weighted(weight_a: Value, a: Surface, weight_b: Value, b: Surface, coverage) -> Surface:
-    share_a, share_b = weight_a * a.alpha, weight_b * b.alpha
-    alpha = _WHITE if a.alpha.equals(1.0) and b.alpha.equals(1.0) else coverage(share_a, share_b)
-    emission = a.emission * share_a + b.emission * share_b
-    if alpha.equals(0.0) and not emission.equals(0.0):
-        alpha = Value.of(GLOW_COVERAGE)
-    main = a if a.base_color is not None else b
-    return Surface(_ratio(a.albedo * share_a + b.albedo * share_b, alpha), _ratio(emission, alpha), alpha,
-                   main.base_color, main.metallic, main.roughness, main.specular)
+def _weighted(*weighted: tuple[Value, Surface], coverage) -> Surface:
+    """The sum of two surfaces, each with its weight; ``coverage`` makes one of what each covers."""
+    surfaces = [surface for _weight, surface in weighted]
+    shares = [weight * surface.alpha for weight, surface in weighted]
+
+    def total(name: str) -> Value:
+        first, second = (getattr(surface, name) * share for surface, share in zip(surfaces, shares, strict=True))
+        return first + second
+
+    alpha = _WHITE if all(surface.alpha.equals(1.0) for surface in surfaces) else coverage(*shares)
+    emission, reflected, through = total("emission"), total("albedo"), total("translucency")
+    passed = add(*(weight * (1.0 - surface.alpha) * surface.tint for weight, surface in weighted))
+    added_to_nothing = alpha.equals(0.0) and not (reflected.equals(0.0) and through.equals(0.0))
+    if alpha.equals(0.0):
+        alpha = _least_coverage(reflected, through, emission, passed)
+    tint = _WHITE if _clear(*surfaces) and not added_to_nothing else ratio(passed, 1.0 - alpha)
+    main = next((surface for surface in surfaces if surface.base_color is not None), surfaces[-1])
+    return Surface(ratio(reflected, alpha), ratio(emission, alpha), alpha, main.base_color, main.metallic, main.roughness,
+                   main.specular, tint, ratio(through, alpha), **_bending(*weighted))
 
 
-def _covering(surface: Surface, alpha: Value) -> Surface:
-    return replace(surface, alpha=alpha)
+def _least_coverage(reflected: Value, through: Value, emission: Value, passed: Value) -> Value:
+    """Coverage of what is added to a surface that all rays pass: something must be there to reflect, or to emit."""
+    matter = reflected + through
+    if matter.equals(0.0):
+        return _BLACK if emission.equals(0.0) else Value.of(GLOW_COVERAGE)
+    if not matter.is_constant or not passed.is_constant:
+        return Value.of(VARYING_COVERAGE)
+    return Value.of(min(max(float(matter.constant.max()), 1.0 - float(passed.constant.max()), GLOW_COVERAGE), 1.0 - GLOW_COVERAGE))
+
+
+def _bending(*weighted: tuple[Value, Surface]) -> dict:
+    """``glass`` and ``clear`` of a sum of surfaces, each with its weight."""
+    if not any(surface.glass for _weight, surface in weighted):
+        return {}
+    clear = sum((weight * surface.transparency for weight, surface in weighted), _BLACK)
+    return {"glass": True, "clear": clear.clamped()}
+
+
+def _clear(*surfaces: Surface) -> bool:
+    """Whether what passes any of them keeps its colour."""
+    return all(surface.alpha.equals(1.0) or surface.tint.equals(1.0) for surface in surfaces)
 
 
 def _glows(surface: Surface) -> bool:
     return not surface.emission.equals(0.0)
 
 
-def _grey(color: np.ndarray) -> np.ndarray:
-    return np.repeat(color @ LUMINANCE, 3).reshape(color.shape)
-
-
-def _ratio(value: Value, alpha: Value) -> Value:
+def ratio(value: Value, alpha: Value) -> Value:
     """``value`` per covered share; 0 where nothing is covered."""
     if alpha.equals(1.0) or value.equals(0.0):
         return value
@@ -249,6 +347,9 @@ _READERS = {
     "ShaderNodeEmission": ShaderReader._emission,
     "ShaderNodeBackground": ShaderReader._emission,
     "ShaderNodeHoldout": ShaderReader._black,
+    "ShaderNodeBsdfToon": ShaderReader._toon,
+    "ShaderNodeBsdfSheen": ShaderReader._sheen,
+    "ShaderNodeBsdfHair": ShaderReader._diffuse,
     "ShaderNodeMixShader": ShaderReader._mix,
     "ShaderNodeAddShader": ShaderReader._add,
 }

@@ -2,12 +2,15 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from ...numerics.colour import linear_from_srgb, srgb_from_linear
 from ...scene import Channel, Texture
+from ..colour import luminance_weights
 
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # Rec.709, as Blender turns a colour into a number
+_LARGEST_HALF = float(np.finfo(np.float16).max)
 
 
 class Unreadable(Exception):
@@ -18,8 +21,12 @@ class Unreadable(Exception):
         self.node, self.reason = node, reason
 
 
+@dataclass(frozen=True, eq=False)
 class ComputedTexture(Texture):
-    """Float texels made here from other textures or by a bake: stored as bytes in the end where their range allows."""
+    """Scene-linear float texels made here from other textures or by a bake. ``coded`` says that they come from images that are
+    filtered coded (see ``Texture``), and so must be what becomes of them."""
+
+    coded: bool = False
 
 
 @dataclass(frozen=True)
@@ -64,39 +71,36 @@ class Value:
         return self.is_constant and bool(np.all(self.constant == number))
 
     def __add__(self, other) -> "Value":
-        a, b = Value.of(self), Value.of(other)
-        if a.is_constant:
-            a, b = b, a
-        if b.equals(0.0):
-            return a
-        if a.cut is None and b.is_constant:
-            if a.is_constant:
-                return Value.of(a.constant + b.constant)
-            return replace(a, offset=_total(a.offset, b.constant))
-        if a.cut is None and b.cut is None and _factors(a) == _factors(b):
-            return replace(a, constant=a.constant + b.constant, offset=_total(a.offset, b.offset))
-        return apply(np.add, a, b)
+        first, second = _constant_last(self, other)
+        if second.equals(0.0):
+            return first
+        if first.cut is None and second.is_constant:
+            if first.is_constant:
+                return Value.of(first.constant + second.constant)
+            return replace(first, offset=_total(first.offset, second.constant))
+        if first.cut is None and second.cut is None and _factors(first) == _factors(second):
+            return replace(first, constant=first.constant + second.constant, offset=_total(first.offset, second.offset))
+        return apply(np.add, first, second)
 
     __radd__ = __add__
 
     def __mul__(self, other) -> "Value":
-        a, b = Value.of(self), Value.of(other)
-        if a.is_constant:
-            a, b = b, a
-        if b.is_constant:
-            if a.is_constant:
-                return Value.of(a.constant * b.constant)
-            if b.equals(0.0):
+        first, second = _constant_last(self, other)
+        if second.is_constant:
+            if first.is_constant:
+                return Value.of(first.constant * second.constant)
+            if second.equals(0.0):
                 return Value.of(0.0)
-            if b.equals(1.0):
-                return a
-            if a.cut is None:
-                return replace(a, constant=a.constant * b.constant, offset=None if a.offset is None else a.offset * b.constant)
-        separable = a.cut is None and b.cut is None and a.offset is None and b.offset is None
-        if separable and (a.texture is None or b.texture is None) and (a.attribute is None or b.attribute is None):
-            textured = a if a.texture is not None else b
-            return replace(textured, constant=a.constant * b.constant, attribute=a.attribute or b.attribute)
-        return apply(np.multiply, a, b)
+            if second.equals(1.0):
+                return first
+            if first.cut is None:
+                return replace(first, constant=first.constant * second.constant,
+                               offset=None if first.offset is None else first.offset * second.constant)
+        separable = all(value.cut is None and value.offset is None for value in (first, second))
+        if separable and None in (first.texture, second.texture) and None in (first.attribute, second.attribute):
+            textured = first if first.texture is not None else second
+            return replace(textured, constant=first.constant * second.constant, attribute=first.attribute or second.attribute)
+        return apply(np.multiply, first, second)
 
     __rmul__ = __mul__
 
@@ -132,11 +136,11 @@ class Value:
     def luminance(self) -> "Value":
         """The number Blender makes of a colour."""
         if self.texture is None and self.attribute is None:
-            return Value.of(float(self.constant @ LUMINANCE))
+            return Value.of(float(self.constant @ luminance_weights()))
         grey = _is_grey(self.constant) and (self.offset is None or _is_grey(self.offset))
         if grey and self.attribute is None and (self.texture_channel != "rgb" or self.texture.pixels.shape[2] == 1):
             return self
-        return apply(lambda x: np.repeat(x @ LUMINANCE, 3).reshape(x.shape), self)
+        return apply(lambda x: np.repeat(x @ luminance_weights(), 3).reshape(x.shape), self)
 
     def component(self, index: int) -> "Value":
         """The red, green or blue component, repeated."""
@@ -184,7 +188,8 @@ def apply(function: Callable, *values: Value) -> Value:
     width = max(value.texture.pixels.shape[1] for value in varying)
     arrays = [value.constant if value.is_constant else _resized(texels(value), height, width) for value in values]
     pixels = np.broadcast_to(np.asarray(function(*arrays), np.float32), (height, width, 3))
-    texture = ComputedTexture(first.texture.name, pixels, False, first.texture.extension, first.texture.interpolation)
+    coded = any(value.texture.srgb or getattr(value.texture, "coded", False) for value in varying)
+    texture = ComputedTexture(first.texture.name, pixels, False, first.texture.extension, first.texture.interpolation, coded)
     return Value(np.ones(3, np.float32), texture, mapping=first.mapping)
 
 
@@ -208,20 +213,17 @@ def texels(value: Value) -> np.ndarray:
     return result
 
 
-def linear_from_srgb(encoded: np.ndarray) -> np.ndarray:
-    """Decode IEC 61966-2-1."""
-    return np.where(encoded <= 0.04045, encoded / 12.92, ((np.maximum(encoded, 0.0) + 0.055) / 1.055) ** 2.4).astype(np.float32)
+def _constant_last(first, second) -> tuple[Value, Value]:
+    """Both as Values; if only one of them is constant, that is the second."""
+    first, second = Value.of(first), Value.of(second)
+    return (second, first) if first.is_constant else (first, second)
 
 
-def srgb_from_linear(linear: np.ndarray) -> np.ndarray:
-    """Encode IEC 61966-2-1."""
-    return np.where(linear <= 0.0031308, linear * 12.92, 1.055 * np.maximum(linear, 0.0) ** (1 / 2.4) - 0.055).astype(np.float32)
-
-
-def _total(a, b):
-    if a is None or b is None:
-        return a if b is None else b
-    return a + b
+def _total(first, second):
+    """The sum of two offsets, each of which may be None."""
+    if first is None or second is None:
+        return first if second is None else second
+    return first + second
 
 
 def _is_grey(color) -> bool:
@@ -245,13 +247,26 @@ def _resized(pixels: np.ndarray, height: int, width: int) -> np.ndarray:
 
 
 def _compact(texture: Texture | None) -> Texture | None:
-    """A computed texture within [0, 1] as sRGB-encoded bytes (rounding: at most 0.5 % of full scale), one channel where grey."""
+    """A computed texture as small as its values allow, one channel where grey: sRGB bytes (rounding: at most 0.5 % of full scale)
+    where it is to be filtered coded and lies within [0, 1], else linear half floats, or floats beyond their range. However many
+    channels read it, there is one."""
     if not isinstance(texture, ComputedTexture):
         return texture
+    if texture not in _compacted:
+        _compacted[texture] = _compacted_anew(texture)
+    return _compacted[texture]
+
+
+_compacted: WeakKeyDictionary[ComputedTexture, Texture] = WeakKeyDictionary()
+
+
+def _compacted_anew(texture: ComputedTexture) -> Texture:
     pixels = texture.pixels
     if np.array_equal(pixels[..., 0], pixels[..., 1]) and np.array_equal(pixels[..., 0], pixels[..., 2]):
         pixels = pixels[..., :1]
-    if pixels.min() < 0.0 or pixels.max() > 1.0:
-        return Texture(texture.name, np.ascontiguousarray(pixels), False, texture.extension, texture.interpolation)
-    codes = np.rint(srgb_from_linear(pixels) * 255.0).astype(np.uint8)
-    return Texture(texture.name, codes, True, texture.extension, texture.interpolation)
+    low, high = float(pixels.min()), float(pixels.max())
+    if texture.coded and low >= 0.0 and high <= 1.0:
+        pixels = np.rint(srgb_from_linear(pixels) * 255.0).astype(np.uint8)
+    elif max(-low, high) < _LARGEST_HALF:
+        pixels = pixels.astype(np.float16)
+    return Texture(texture.name, np.ascontiguousarray(pixels), pixels.dtype == np.uint8, texture.extension, texture.interpolation)

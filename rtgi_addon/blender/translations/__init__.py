@@ -1,4 +1,5 @@
-"""The add-on in the user's language: one module per language here, given to Blender's own translation.
+"""The add-on in the user's language: one folder a language, given to Blender's own translation. A language comes in as a folder
+with ``INTERFACE`` and ``SENTENCES`` and a line in LANGUAGES; a test prints what one lacks.
 
 Labels and tooltips of registered classes, and texts of layouts, Blender looks up itself. What the panel composes goes through
 Blender's ``pgettext_…`` before it is formatted. What comes from below, where nothing knows Blender, is a finished English

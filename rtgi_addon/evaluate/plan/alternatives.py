@@ -9,7 +9,7 @@ from ... import techniques
 from ...errors import BakeError
 from ...progress import Progress
 from ...techniques import Technique
-from ...transport.ray_counter import count_rays
+from ...transport.rays.ray_counter import count_rays
 from ..metrics import Figure
 from .pilot import Pilot
 from .sample import NORMALS_PER_POINT
@@ -38,15 +38,18 @@ class Measured:
 
 def measure_others(pilot: Pilot, names: list[str], seed: int, progress: Progress) -> list[Measured]:
     """The techniques ``names``, one after another. Raises Cancelled."""
-    found = []
+    measured = []
     for number, name in enumerate(names):
         progress.step(number / len(names), f"measuring {name}")
         method = techniques.get(name)
+        if method.not_weighed:
+            measured.append(Measured(name, method.label, why_not=method.not_weighed))
+            continue
         try:
-            found.append(_measure(pilot, method, seed, progress.span(number / len(names), (number + 1) / len(names))))
+            measured.append(_measure(pilot, method, seed, progress.span(number / len(names), (number + 1) / len(names))))
         except BakeError as error:
-            found.append(Measured(name, method.label, why_not=error.cause))
-    return found
+            measured.append(Measured(name, method.label, why_not=error.cause))
+    return measured
 
 
 def _measure(pilot: Pilot, method: Technique, seed: int, progress: Progress) -> Measured:
@@ -60,7 +63,7 @@ def _measure(pilot: Pilot, method: Technique, seed: int, progress: Progress) -> 
             baked.grids()
             points.append((sum(float(np.prod(volume.resolution)) for volume in volumes), counter.rays, perf_counter() - started))
     (few, first_rays, first_seconds), (more, rays, seconds) = points
-    per_probe = [max(b - a, 0.0) / max(more - few, 1.0) for a, b in ((first_rays, rays), (first_seconds, seconds))]
+    per_probe = [max(dear - cheap, 0.0) / max(more - few, 1.0) for cheap, dear in ((first_rays, rays), (first_seconds, seconds))]
     count = min(POINTS, pilot.sample.points) * NORMALS_PER_POINT
     receivers = pilot.sample.receivers.take(slice(0, count))
     error = pilot.sample.error(baked.irradiance(receivers.points, receivers.normals), pilot.truth)

@@ -13,28 +13,36 @@ import numpy as np
 
 from ...progress import Progress
 from ...scene import ProbeVolume
-from ...techniques.probes.adaptive import FIRST_ROUND, SAMPLING_SHARE, SLOPE, ErrorModel, ladder
-from ...techniques.probes.bake import surface_cache
+from ...techniques.lamp_light import LampLight
+from ...techniques.lattice.placement import PILOT_RAYS, place_points
+from ...techniques.probes import LAMP_SAMPLES
+from ...techniques.probes.adaptive import FIRST_ROUND, SAMPLING_SHARE, SLOPE, ErrorModel
+from ...techniques.probes.bake import Begun, surface_cache
 from ...techniques.probes.gather import GROUP
-from ...techniques.probes.placement import place_points
-from ...techniques.probes.reconstruction import dering
+from ...techniques.probes.gathering import HALVES, PROBE_RAYS, ProbeLight, light_at_probes, light_at_receivers
 from ...techniques.probes.settings import ProbeSettings
 from ...transport.context import LightContext
-from ...transport.ray_counter import count_rays
+from ...transport.rays.ray_counter import count_rays
 from ..metrics import Figure
 from ..receivers import Receivers
 from ..references import Truth
-from .gathering import HALVES, PROBE_RAYS, ProbeLight, light_at_probes, light_at_receivers
 from .sample import NORMALS_PER_POINT, Sample
-from .sparse import SparseField, SparseLookup, positions_of, probes_read
+from .sparse import SparseField, SparseLookup, answered, positions_of, probes_read
 
 # The bake's target error at which the pilot's surface cache is made: as coarse as any that is planned.
 PILOT_ERROR = 0.1
-# Rays of a receiver where 5 % are asked for, and the least and the most.
-RECEIVER_RAYS, RECEIVER_RANGE = 256, (128, 4096)
-# Shares of the surface points on which a lattice is measured: more only where fewer leave open whether it will do.
-LEVELS = (1.0 / 16.0, 0.25, 1.0)
-FEWEST_POINTS = 64
+# Rays of a receiver where USUAL_TARGET is asked for, and the least and the most: errors differ more between points than by noise.
+RECEIVER_RAYS, RECEIVER_RANGE, USUAL_TARGET = 128, (128, 4096), 0.05
+# Shares of the surface points on which a lattice is measured: more only where fewer leave open whether it will do, and where that
+# is worth its rays.
+LEVELS = (1.0 / 16.0, 0.125, 0.25, 0.5, 1.0)
+FEWEST_POINTS = 128
+# The share of the points that lattices are compared without where none meets the target.
+WORST = 0.02
+# Rays of one of the pilot's probes, its placement included.
+RAYS_A_PROBE = PROBE_RAYS + 2 * PILOT_RAYS
+# How far a measurement is when the truth is traced and the probes are placed, and when their light is gathered.
+_PLACED, _GATHERED = 0.2, 0.9
 # What the cache itself is off at surfaces, as a share of the bake's target error: both sides of the pilot's comparison share a
 # cache, so this is not seen in it. Measured against the path tracer on the samples: a tenth to a sixth.
 CACHE_SHARE = 0.15
@@ -53,7 +61,8 @@ class Reading:
     """What one set of lattices is worth. ``volumes`` have the resolutions that were measured; ``probes`` how many were baked.
 
     ``estimate(order)`` is the irradiance (n, 3) at the first n receivers of the pilot's; ``variance`` (n, 3) is that of
-    PROBE_RAYS rays a probe; ``model`` knows the noise of each of the m probes, and ``mixed`` (n, m) their shares in the receivers.
+    PROBE_RAYS rays a probe; ``model`` knows the noise of each of the m probes, and ``mixed`` gives a mean (n,) over the probes that
+    each receiver reads, in their shares, of any number (m,) that they have.
     """
 
     volumes: tuple[ProbeVolume, ...]
@@ -62,7 +71,7 @@ class Reading:
     variance: np.ndarray
     pilot: "Pilot"
     model: ErrorModel
-    mixed: np.ndarray
+    mixed: Callable[[np.ndarray], np.ndarray]
     effort: Effort
     _known: dict = field(default_factory=dict, repr=False)
 
@@ -85,8 +94,8 @@ class Reading:
     def _rays(self, error: float) -> np.ndarray:
         probes = np.flatnonzero(self.model.rays > 0)
         groups = np.unique(probes // GROUP, return_inverse=True)[1].reshape(-1)
-        needed = self.model.rays_needed(probes, groups, error * SAMPLING_SHARE)
-        return ladder(np.maximum(needed, FIRST_ROUND), ProbeSettings().max_rays)
+        needed = self.model.rays_needed(probes, groups, error * SAMPLING_SHARE, ProbeSettings().max_rays)
+        return np.maximum(needed, FIRST_ROUND)
 
     def error(self, order: int, error: float | None = None) -> Figure:
         """Relative RMSE at the receivers, and its standard error over surface points, of a bake with SH of ``order`` and the target
@@ -95,18 +104,31 @@ class Reading:
             self._known[order, error] = self._error(order, error)
         return self._known[order, error]
 
+    def bulk(self, order: int, error: float) -> float:
+        """``error`` without the worst points, of which one more or less may hold most of it."""
+        key = "bulk", order, error
+        if key not in self._known:
+            forgiven, allowance = self._noise(error)
+            figure = self.pilot.sample.error(self.estimate(order), self.pilot.truth, forgiven, trimmed=WORST)
+            self._known[key] = float(np.hypot(figure.value, allowance))
+        return self._known[key]
+
     def _error(self, order: int, error: float | None) -> Figure:
-        estimate = self.estimate(order)
+        forgiven, allowance = self._noise(error)
+        figure = self.pilot.sample.error(self.estimate(order), self.pilot.truth, forgiven)
+        value = float(np.hypot(figure.value, allowance))
+        return Figure(value, figure.standard_error * (figure.value / value if value > 0 else 1.0))
+
+    def _noise(self, error: float | None) -> tuple[np.ndarray, float]:
+        """The pilot's variance (n, 3) that a bake to ``error`` does not have, and what its cache is off by."""
         forgiven, allowance = self.variance, 0.0
         if error is not None:
             probes = np.flatnonzero(self.model.rays > 0)
             ratio = np.zeros(len(self.model.rays))
             ratio[probes] = (PROBE_RAYS / self.rays(error)) ** (2 * SLOPE)
-            forgiven = forgiven - self.variance * (self.mixed @ ratio)[:, None]
+            forgiven = forgiven - self.variance * self.mixed(ratio)[:, None]
             allowance = CACHE_SHARE * error
-        figure = self.pilot.sample.error(estimate, self.pilot.truth, forgiven)
-        value = float(np.hypot(figure.value, allowance))
-        return Figure(value, figure.standard_error * (figure.value / value if value > 0 else 1.0))
+        return forgiven, allowance
 
 
 class Pilot:
@@ -119,8 +141,10 @@ class Pilot:
         self.context, self.volumes, self.sample, self.orders, self._seed = context, volumes, sample, orders, seed
         self.settings = ProbeSettings(order=max(orders), error=PILOT_ERROR)
         self.cache = surface_cache(context, volumes, self.settings, seed)
-        self.receiver_rays = int(np.clip(RECEIVER_RAYS * 2.0 ** round(2.0 * np.log2(0.05 / target)), *RECEIVER_RANGE))
+        self.receiver_rays = int(np.clip(RECEIVER_RAYS * 2.0 ** round(2.0 * np.log2(USUAL_TARGET / target)), *RECEIVER_RANGE))
         self._known: dict[tuple, Reading] = {}
+        self._baked: dict[tuple, _Baked] = {}  # by lattice, each as if of one volume
+        self._probes = 0
         self.truth, self.truth_effort = Truth(*np.zeros((2, 0, 3))), Effort(0, 0.0)
         self._trace_truth(self.points(0), progress)
 
@@ -129,6 +153,16 @@ class Pilot:
         """All that was measured so far."""
         return tuple(self._known.values())
 
+    @property
+    def begun(self) -> Begun:
+        """What a bake of the same scene need not do again."""
+        return Begun(self.context, self.cache, self.settings.target)
+
+    @property
+    def spent(self) -> int:
+        """Rays that went into what a bake has no use for: all but those of the cache."""
+        return len(self.truth.mean) * self.receiver_rays + self._probes * RAYS_A_PROBE
+
     def points(self, level: int) -> int:
         """Surface points of a ``level`` of LEVELS."""
         return max(min(FEWEST_POINTS, self.sample.points), round(LEVELS[level] * self.sample.points))
@@ -136,12 +170,16 @@ class Pilot:
     def measure(self, resolutions: tuple[tuple[int, int, int], ...], progress: Progress, level: int = -1) -> Reading:
         """The Reading of the volumes at ``resolutions`` on the surface points of ``level``; what was measured before is not
         measured again. Raises Cancelled."""
-        resolutions = tuple(tuple(int(count) for count in resolution) for resolution in resolutions)
+        volumes = tuple(replace(volume, resolution=tuple(int(count) for count in resolution))
+                        for volume, resolution in zip(self.volumes, resolutions, strict=True))
+        return self.measure_volumes(volumes, progress, level)
+
+    def measure_volumes(self, volumes: tuple[ProbeVolume, ...], progress: Progress, level: int = -1) -> Reading:
+        """The same of any ``volumes``, of other boxes than the pilot's as well. Raises Cancelled."""
         points = self.points(level)
-        self._trace_truth(points, progress.span(0.0, 0.2))
-        key = resolutions, points
+        self._trace_truth(points, progress.span(0.0, _PLACED))
+        key = tuple(map(_lattice, volumes)), points
         if key not in self._known:
-            volumes = tuple(replace(volume, resolution=own) for volume, own in zip(self.volumes, resolutions, strict=True))
             self._known[key] = self._measured(volumes, self.sample.receivers.take(slice(0, points * NORMALS_PER_POINT)), progress)
         return self._known[key]
 
@@ -152,53 +190,124 @@ class Pilot:
             return
         with count_rays() as counter:
             started = perf_counter()
-            more = light_at_receivers(self.context, self.cache, self.settings, self.sample.receivers.take(slice(done, wanted)),
+            receivers = self.sample.receivers.take(slice(done, wanted))
+            more = light_at_receivers(self.context, self.cache, self.settings, receivers.points, receivers.normals,
+                                      LampLight(self.context, self.settings.direct, LAMP_SAMPLES, self._seed + 1 + done),
                                       self.receiver_rays, self._seed + 1 + done, progress)
             effort = Effort(self.truth_effort.rays + counter.rays, self.truth_effort.seconds + perf_counter() - started)
         self.truth, self.truth_effort = Truth(*(np.concatenate(parts) for parts in zip(self.truth, more, strict=True))), effort
 
     def _measured(self, volumes: tuple[ProbeVolume, ...], receivers: Receivers, progress: Progress) -> Reading:
-        points = receivers.points
+        read = [probes_read(volume, receivers.points[rows], receivers.normals[rows])
+                for volume, rows in zip(volumes, answered(volumes, receivers.points), strict=True)]
         with count_rays() as counter:
             started = perf_counter()
-            rows = [probes_read(volume, points) for volume in volumes]
-            owner = np.repeat(np.arange(len(volumes)), [len(part) for part in rows])
-            lattice = np.concatenate([positions_of(volume, part) for volume, part in zip(volumes, rows, strict=True)])
-            placement = place_points(self.context, volumes, lattice, owner, self.settings.virtual_offset, progress.span(0.0, 0.2))
-            light = light_at_probes(self.context, self.cache, self.settings, placement, self._seed, progress.span(0.2, 0.9))
+            baked = self._completed(volumes, read, progress)
             effort = Effort(counter.rays, perf_counter() - started)
-        found = SparseField([SparseLookup(volume, part, (lattice + placement.offset)[owner == number],
-                                          placement.measured[owner == number], light.visibility[owner == number],
-                                          light.sh[owner == number])
-                             for number, (volume, part) in enumerate(zip(volumes, rows, strict=True))])
-        return self._reading(volumes, receivers, found, light, placement, owner, effort)
+        sparse = SparseField([SparseLookup(volume, *baked.of_volume(number)) for number, volume in enumerate(volumes)])
+        return self._reading(volumes, receivers, sparse, baked, effort)
 
-    def _reading(self, volumes, receivers, field, light: ProbeLight, placement, owner, effort) -> Reading:
-        def under(sh):
-            parts = {id(volume): sh[owner == number] for number, volume in enumerate(volumes)}
-            return field.holding(lambda lookup: parts[id(lookup.volume)]).irradiance(receivers.points, receivers.normals)
+    def _completed(self, volumes, read: list[np.ndarray], progress: Progress) -> "_Baked":
+        """Light of the probes that are ``read`` (rows by volume) and of those that are known, which are not traced again."""
+        known = [self._baked.get(_lattice(volume)) for volume in volumes]
+        rows = [probes if old is None else np.setdiff1d(probes, old.rows) for probes, old in zip(read, known, strict=True)]
+        owner = np.repeat(np.arange(len(volumes)), [len(own) for own in rows])
+        if len(owner):
+            self._probes += len(owner)
+            lattice = np.concatenate([positions_of(volume, own) for volume, own in zip(volumes, rows, strict=True)])
+            placement = place_points(self.context, volumes, lattice, owner, self.settings.virtual_offset,
+                                     progress.span(0.0, _PLACED))
+            # Groups of probes share directions: those of a later call are others.
+            seed = self._seed + sum(len(old.rows) for old in known if old is not None)
+            light = light_at_probes(self.context, self.cache, self.settings, placement, seed, progress.span(_PLACED, _GATHERED))
+            new = _Baked(owner, np.concatenate(rows), lattice + placement.offset, placement.measured, light)
+            for number, (volume, old) in enumerate(zip(volumes, known, strict=True)):
+                own = new.take(np.flatnonzero(owner == number), 0)
+                known[number] = self._baked[_lattice(volume)] = own if old is None else old.joined(own)
+        return _Baked.stacked([own.take(np.arange(len(own.rows)), number) for number, own in enumerate(known) if own is not None])
 
+    def _reading(self, volumes, receivers, field, baked: "_Baked", effort) -> Reading:
+        light, owner = baked.light, baked.owner
+        shares = _Shares(volumes, receivers, field, owner)
+
+        # Neither is deringed: that would be the noise of few rays, which a bake does not have.
         @cache
         def estimate(order):
-            return under(dering(light.sh[:, :(order + 1) ** 2]))
+            return shares.irradiance(light.sh[:, :(order + 1) ** 2])
 
-        # Without deringing, which would cut off some of the noise and is slow.
-        halves = [under((part / light.rays).astype(np.float32)) for part in (light.first, light.second)]
+        halves = [shares.irradiance((sums / light.rays).astype(np.float32)) for sums in (light.first, light.second)]
         model = ErrorModel(len(owner), light.first.shape[1])
-        probes = np.flatnonzero(placement.measured)
-        for part in (light.first, light.second):
-            model.add(probes, part[probes], np.full(len(probes), light.rays))
+        probes = np.flatnonzero(baked.measured)
+        for sums in (light.first, light.second):
+            model.add(probes, sums[probes], np.full(len(probes), light.rays))
         return Reading(volumes, len(probes), estimate, HALVES * (halves[0] - halves[1]) ** 2, self, model,
-                       _mixed(volumes, receivers, field, owner), effort)
+                       shares.mixed, effort)
 
 
-def _mixed(volumes, receivers: Receivers, field: SparseField, owner: np.ndarray) -> np.ndarray:
-    """Share (n, m) of every probe in what each receiver reads."""
-    share = field.shares(receivers.points)
-    mixed = np.zeros((len(receivers.points), len(owner)), np.float32)
-    starts = {id(volume): np.searchsorted(owner, number) for number, volume in enumerate(volumes)}
-    receiver = np.repeat(np.arange(len(receivers.points)), 8)
-    for column, lookup in enumerate(field.lookups):
-        index, weight = lookup.weights(receivers.points, receivers.normals)
-        np.add.at(mixed, (receiver, starts[id(lookup.volume)] + index.ravel()), (weight * share[:, column, None]).ravel())
-    return mixed
+def _lattice(volume: ProbeVolume) -> tuple:
+    """What makes the lattice of ``volume``: its box and its resolution."""
+    return tuple(volume.resolution), np.asarray(volume.world_from_local, np.float64).tobytes()
+
+
+@dataclass(frozen=True, eq=False)
+class _Baked:
+    """Some probes of lattices, sorted by the volume ``owner`` (m,) and the flat index ``rows`` (m,) in it: ``positions`` (m, 3),
+    which of them were ``measured`` (m,), and their ``light``."""
+
+    owner: np.ndarray
+    rows: np.ndarray
+    positions: np.ndarray
+    measured: np.ndarray
+    light: ProbeLight
+
+    def take(self, chosen: np.ndarray, owner: int) -> "_Baked":
+        """Those of the rows ``chosen`` (indices), as probes of the volume ``owner``."""
+        light = ProbeLight(self.light.first[chosen], self.light.second[chosen], self.light.rays, self.light.visibility[chosen])
+        return _Baked(np.full(len(chosen), owner), self.rows[chosen], self.positions[chosen], self.measured[chosen], light)
+
+    def joined(self, other: "_Baked") -> "_Baked":
+        """These and ``other`` probes of the same lattice."""
+        return _Baked.stacked([self, other]).take(np.argsort(np.append(self.rows, other.rows)), 0)
+
+    @staticmethod
+    def stacked(parts: list["_Baked"]) -> "_Baked":
+        """The probes of several, one after another, of whatever volumes they are."""
+        def all_of(name: str, of=lambda part: part) -> np.ndarray:
+            return np.concatenate([getattr(of(part), name) for part in parts])
+
+        light = [all_of(name, lambda part: part.light) for name in ("first", "second", "visibility")]
+        return _Baked(*map(all_of, ("owner", "rows", "positions", "measured")),
+                      ProbeLight(light[0], light[1], parts[0].light.rays, light[2]))
+
+    def of_volume(self, number: int) -> tuple[np.ndarray, ...]:
+        """Rows, positions, liveness, distances and coefficients of the probes of a volume, as SparseLookup takes them."""
+        own = self.owner == number
+        return self.rows[own], self.positions[own], self.measured[own], self.light.visibility[own], self.light.sh[own]
+
+
+class _Shares:
+    """Which probes each of ``receivers`` reads in ``field``, and in what shares: once, for all that is asked of the same lattices.
+    The m probes stand one volume after another, ``owner`` (m,)."""
+
+    def __init__(self, volumes, receivers: Receivers, field: SparseField, owner: np.ndarray):
+        share = field.shares(receivers.points)
+        starts = {id(volume): np.searchsorted(owner, number) for number, volume in enumerate(volumes)}
+        self._normals, self._parts = receivers.normals, []
+        for column, lookup in enumerate(field.lookups):
+            rows = np.flatnonzero(share[:, column])
+            index, weight = lookup.weights(receivers.points[rows], receivers.normals[rows])
+            self._parts.append((lookup, rows, starts[id(lookup.volume)] + index, weight, share[rows, column, None]))
+
+    def mixed(self, values: np.ndarray) -> np.ndarray:
+        """See Reading.mixed."""
+        total = np.zeros(len(self._normals))
+        for _, rows, index, weight, share in self._parts:
+            total[rows] += np.sum(weight * share * values[index], axis=1)
+        return total
+
+    def irradiance(self, sh: np.ndarray) -> np.ndarray:
+        """Irradiance (n, 3) at the receivers if the probes had the coefficients ``sh`` (m, k, 3)."""
+        total = np.zeros((len(self._normals), 3), np.float32)
+        for lookup, rows, index, weight, share in self._parts:
+            total[rows] += share * lookup.read(sh, index, weight, self._normals[rows])
+        return total

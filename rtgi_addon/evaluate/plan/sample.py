@@ -5,8 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ...errors import BakeError
-from ...numerics.grid import cell_size, lattice_points, local_from_world
+from ...numerics.grid import local_from_world
+from ...numerics.heavy_tail import interval_of_another_draw
 from ...scene import ProbeVolume
+from ...techniques.lattice.focus import probes_of, spacing_of
 from ...transport.context import LightContext
 from ..measure import LIFT
 from ..metrics import Figure
@@ -19,6 +21,10 @@ NORMAL_WEIGHTS = np.array([0.5, 1.5])
 # Draws of points before those that are still missing are given up, and the share of the first draw that has to lie in the volumes
 # if only such points are to count.
 DRAWS, FEWEST_WITHIN = 4, 0.25
+
+
+class NothingToSee(BakeError):
+    """Probes see no surface that a plan could be held to."""
 
 
 class Sample(NamedTuple):
@@ -37,28 +43,38 @@ class Sample(NamedTuple):
         """Number of surface points."""
         return len(self.receivers.points) // NORMALS_PER_POINT
 
-    def error(self, estimate: np.ndarray, truth: Truth, forgiven: np.ndarray | float = 0.0) -> Figure:
+    def error(self, estimate: np.ndarray, truth: Truth, forgiven: np.ndarray | float = 0.0, trimmed: float = 0.0) -> Figure:
         """Relative RMSE of ``estimate`` (n, 3) at the first n receivers, weighted as in a chart, and its standard error over
-        points. The variance of ``truth`` and ``forgiven`` (n, 3), the estimate's own, are taken out."""
-        return _root_ratio(*self._squares(estimate, truth, forgiven))
+        points. The variance of ``truth`` and ``forgiven`` (n, 3), the estimate's own, are taken out; the worst points, a share
+        ``trimmed`` of them, are left out."""
+        off, power = self.squares(estimate, truth, forgiven)
+        if trimmed:
+            rows = np.argsort(off, kind="stable")[:len(off) - int(np.ceil(trimmed * len(off)))]
+            off, power = off[rows], power[rows]
+        return _root_ratio_figure(off, power)
+
+    def interval(self, estimate: np.ndarray, truth: Truth, confidence: float) -> tuple[float, float]:
+        """Between what two values ``error`` lies at as many other points, with ``confidence``."""
+        return interval_of_another_draw(*self.squares(estimate, truth, 0.0), confidence)
 
     def concentration(self, estimate: np.ndarray, truth: Truth, share: float) -> float:
         """What the worst ``share`` of the points has of the squared error of ``estimate`` (n, 3)."""
-        off = np.sort(np.maximum(self._squares(estimate, truth, 0.0)[0], 0.0))
+        off = np.sort(np.maximum(self.squares(estimate, truth, 0.0)[0], 0.0))
         total = float(off.sum())
         return float(off[-max(1, round(share * len(off))):].sum()) / total if total > 0 else 0.0
 
     @staticmethod
-    def _squares(estimate, truth: Truth, forgiven) -> tuple[np.ndarray, np.ndarray]:
-        """Squared error and squared truth (p,) of each point, without noise."""
+    def squares(estimate, truth: Truth, forgiven) -> tuple[np.ndarray, np.ndarray]:
+        """Squared error of ``estimate`` (n, 3) and squared truth (p,) of each point, the variance of the truth and what is
+        ``forgiven`` taken out."""
         weights = np.tile(NORMAL_WEIGHTS, len(estimate) // NORMALS_PER_POINT)[:, None]
         points = (-1, NORMALS_PER_POINT * 3)
-        mean, variance = (part[:len(estimate)] for part in truth)
+        mean, variance = (values[:len(estimate)] for values in truth)
         return ((weights * ((estimate - mean) ** 2 - variance - forgiven)).reshape(points).sum(axis=1),
                 (weights * (mean**2 - variance)).reshape(points).sum(axis=1))
 
 
-def _root_ratio(off: np.ndarray, power: np.ndarray) -> Figure:
+def _root_ratio_figure(off: np.ndarray, power: np.ndarray) -> Figure:
     """√(Σ off / Σ power) over points (p,), with the standard error of a ratio of sums (linearised)."""
     total, count = float(power.sum()), len(power)
     if total <= 0.0:
@@ -75,25 +91,24 @@ def draw_sample(context: LightContext, volumes: tuple[ProbeVolume, ...], points:
     Points outside the volumes are left out, since no probe promises anything there, unless nearly all are outside. Raises
     BakeError if no probe lies in the open or no surface can be seen.
     """
-    lattice = np.concatenate([lattice_points(volume.world_from_local, volume.resolution).reshape(-1, 3) for volume in volumes])
-    eyes = lattice[open_probes(context, volumes)]
+    eyes = probes_of(volumes)[open_probes(context, volumes)]
     if not len(eyes):
         raise BakeError("no probe lies in the open", "move the Light Probe Volume out of geometry")
-    lift = LIFT * min(cell_size(volume.world_from_local, volume.resolution).min() for volume in volumes)
-    drawn, inside, found = [], [], 0
+    lift = LIFT * spacing_of(volumes)
+    draws, inside, count = [], [], 0
     for number in range(DRAWS):
-        own_seed = int(np.random.default_rng([seed, number]).integers(1 << 31))
-        part = surface_receivers(context, eyes, points, NORMALS_PER_POINT, own_seed, lift)
-        if not len(part.points):
+        draw_seed = int(np.random.default_rng([seed, number]).integers(1 << 31))
+        draw = surface_receivers(context, eyes, points, NORMALS_PER_POINT, draw_seed, lift)
+        if not len(draw.points):
             break
-        drawn.append(part)
-        inside.append(covered(volumes, part.points[part.own]))
-        found += int(inside[-1].sum())
-        if found >= points or inside[0].mean() < FEWEST_WITHIN:
+        draws.append(draw)
+        inside.append(covered(volumes, draw.points[draw.own]))
+        count += int(inside[-1].sum())
+        if count >= points or inside[0].mean() < FEWEST_WITHIN:
             break
-    if not drawn:
-        raise BakeError("no surface can be seen from any probe", "move the Light Probe Volume to the geometry")
-    receivers, inside = Receivers(*(np.concatenate(part) for part in zip(*drawn, strict=True))), np.concatenate(inside)
+    if not draws:
+        raise NothingToSee("no surface can be seen from any probe", "move the Light Probe Volume to the geometry")
+    receivers, inside = Receivers(*(np.concatenate(arrays) for arrays in zip(*draws, strict=True))), np.concatenate(inside)
     only_within = bool(inside[:points].mean() >= FEWEST_WITHIN)
     rows = np.flatnonzero(inside)[:points] if only_within else np.arange(min(points, len(inside)))
     rows = (rows[:, None] * NORMALS_PER_POINT + np.arange(NORMALS_PER_POINT)).ravel()

@@ -5,8 +5,8 @@ import numpy as np
 from ...numerics import grid as lattice
 from ...numerics import octahedral
 from ...scene import ProbeVolume
-from ...techniques.probes.field import ProbeField
-from ...techniques.probes.lookup import GridLookup, LookupSettings
+from ...techniques.lattice.field import ProbeField
+from ...techniques.lattice.lookup import GridLookup, LookupSettings, neighbours, normal_bias
 
 
 class SparseLookup(GridLookup):
@@ -22,7 +22,7 @@ class SparseLookup(GridLookup):
         self.settings = settings or LookupSettings()
         self.volume, self.rows = volume, rows
         self.cell_volume = lattice.cell_volume(volume.world_from_local, volume.resolution)
-        self.bias = self.settings.normal_bias * lattice.cell_size(volume.world_from_local, volume.resolution).min()
+        self.bias = normal_bias(volume, self.settings)
         self.centre = np.asarray(volume.world_from_local, np.float64)[:3, 3]
         self.positions = (positions - self.centre).astype(np.float32)
         self.live = live
@@ -30,24 +30,24 @@ class SparseLookup(GridLookup):
         self.moments = octahedral.add_border(visibility.reshape(-1, self.tile, self.tile, 2).astype(np.float32)).reshape(-1, 2)
         self.coefficients = sh
 
-    def holding(self, sh: np.ndarray) -> "SparseLookup":
-        """The same probes with other coefficients ``sh`` (m, k, 3)."""
-        other = object.__new__(SparseLookup)
-        other.__dict__.update(self.__dict__)
-        other.coefficients = sh
-        return other
-
-    def neighbours(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def neighbours(self, points: np.ndarray, surface_normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See GridLookup. A neighbour that is not there has no weight, for the points that the probes were made for."""
-        index, trilinear = super().neighbours(points)
+        index, trilinear = super().neighbours(points, surface_normals)
         return np.minimum(np.searchsorted(self.rows, index), len(self.rows) - 1), trilinear
 
 
-def probes_read(volume: ProbeVolume, points: np.ndarray) -> np.ndarray:
-    """Sorted flat indices (m,) of the probes of ``volume`` that interpolation at ``points`` (n, 3) reads."""
-    position = lattice.lattice_from_world(volume.world_from_local, volume.resolution, points)
-    index, weight = lattice.trilinear(position, volume.resolution)
+def probes_read(volume: ProbeVolume, points: np.ndarray, surface_normals: np.ndarray) -> np.ndarray:
+    """Sorted flat indices (m,) of the probes of ``volume`` that are read at ``points`` with ``surface_normals`` (n, 3)."""
+    index, weight = neighbours(volume, points, surface_normals, normal_bias(volume, LookupSettings()))
     return np.unique(index[weight > 0])
+
+
+def answered(volumes: tuple[ProbeVolume, ...], points: np.ndarray) -> list[np.ndarray]:
+    """For each of ``volumes`` the rows of ``points`` (n, 3) that it has a share in, where all of them are one field."""
+    nothing = np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0, bool), np.zeros((0, 1, 2)), np.zeros((0, 1, 3), np.float32)
+    field = SparseField([SparseLookup(volume, *nothing) for volume in volumes])
+    rows = {id(lookup.volume): np.flatnonzero(share) for lookup, share in zip(field.lookups, field.shares(points).T, strict=True)}
+    return [rows[id(volume)] for volume in volumes]
 
 
 def positions_of(volume: ProbeVolume, rows: np.ndarray) -> np.ndarray:
@@ -62,7 +62,3 @@ class SparseField(ProbeField):
 
     def __init__(self, lookups: list[SparseLookup]):
         self.lookups = tuple(sorted(lookups, key=lambda lookup: lookup.cell_volume))
-
-    def holding(self, change) -> "SparseField":
-        """The same field with ``change(lookup)`` → coefficients (m, k, 3) in place of each lookup's own."""
-        return SparseField([lookup.holding(change(lookup)) for lookup in self.lookups])

@@ -1,4 +1,5 @@
-"""The stability suite: scenes in which methods of global illumination are known to fail, and how much ours do.
+"""The stability suite: scenes in which methods of global illumination are known to fail, and how much ours do. A failure comes in
+as a `Case` in one of the families, with a bound for every technique in `limits`; CONTRIBUTING.md says how.
 
 `case` says what a case is, the families (`leaks`, `geometry`, `energy`, `motion`) hold them with their scenes made of `parts`,
 `limits` what each technique is held to, `own` makes cases of a user's own scene, `suite` runs them, `report` and `picture` show

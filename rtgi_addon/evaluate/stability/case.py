@@ -60,7 +60,9 @@ class Bench:
         wanted = {**{name: value for name, value in settings.items() if name in method.Settings.__dataclass_fields__},
                   **self.settings}
         lookup, _ = wanted.pop(LOOKUP, None), wanted.pop(ANEW, None)
-        baked = method.bake(scene, method.Settings(**wanted), np.random.default_rng(self.seed), Progress(), threads=self.threads)
+        baked = method.bake(scene, method.Settings(**wanted), np.random.default_rng(self.seed),
+                            # What it does is shown and can be cancelled; how far the case is, is the case's to say.
+                            self.progress.span(0.0, 0.0), threads=self.threads)
         return baked if lookup is None else baked.with_lookup(replace(baked.lookup, **lookup))
 
 

@@ -11,10 +11,24 @@ from ...numerics import sh
 from ...numerics.grid import lattice_points
 from ...numerics.sampling import fibonacci_sphere
 from ...transport.context import LightContext
-from ...transport.path import irradiance_at
+from ...transport.paths.reference import irradiance_at
 from ..metrics import relative_rmse
 from .case import LOOKUP, Bench, Case, Sample, Variant
-from .parts import ONE, box, brightness, grey, point, quad, receivers, room_with_block, scene, sphere, spot, volume
+from .parts import (
+    ONE,
+    REFERENCE_SEED,
+    box,
+    brightness,
+    grey,
+    point,
+    quad,
+    receivers,
+    room_with_block,
+    scene,
+    sphere,
+    spot,
+    volume,
+)
 
 
 def _near_one_albedo(bench: Bench) -> list[Sample]:
@@ -43,7 +57,7 @@ def _emitter_size(bench: Bench) -> list[Sample]:
         panel = quad("panel", (-half + 0.2, -half, 0.999), (0, 2 * half, 0), (2 * half, 0, 0), material=1)
         built = scene("panel", [box("room", -ONE, ONE, inward=True), panel], [grey(0.5), grey(0.0, 1.0 / half**2, "glow")],
                       volumes=[volume(-ONE, ONE, (4, 4, 4))])
-        exact = irradiance_at(LightContext(built, bench.threads), points, normals, 1024, seed=7)
+        exact = irradiance_at(LightContext(built, bench.threads), points, normals, 1024, seed=REFERENCE_SEED)
         field = bench.bake(built, **_coarse(bench))
         error = relative_rmse(np.asarray(field.irradiance(points, normals)), exact.mean, exact.standard_error**2)
         samples.append(Sample(f"{2000 * half:g} mm wide", error, built, field))
@@ -99,7 +113,7 @@ def _fireflies(bench: Bench) -> list[Sample]:
         points = np.concatenate([np.stack([along, np.full(40, -1.0), np.full(40, -1 + height)], axis=1),
                                  np.stack([np.full(40, -1 + height), np.full(40, 1.0), along], axis=1)]).astype(np.float32)
         normals = np.repeat(np.float32([[0, 1, 0], [0, -1, 0]]), 40, axis=0)
-        exact = irradiance_at(context, points, normals, 512, bounces=bounces, seed=7).mean.mean(axis=1)
+        exact = irradiance_at(context, points, normals, 512, bounces=bounces, seed=REFERENCE_SEED).mean.mean(axis=1)
         samples.append(Sample(f"{1000 * height:g} mm from the edge",
                               float(max((brightness(field, points, normals) / exact).max() - 1.0, 0.0)), built, field))
     return samples
@@ -134,7 +148,7 @@ def _spreading(bench: Bench) -> list[Sample]:
         points = np.concatenate([np.stack([along, np.full(9, 1.0), np.full(9, height - 1)], 1),
                                  np.stack([np.full(9, -1.0), along, np.full(9, height - 1)], 1)]).astype(np.float32)
         normals = np.repeat(np.float32([[0, -1, 0], [1, 0, 0]]), 9, axis=0)
-        exact = irradiance_at(context, points, normals, 1024, seed=7)
+        exact = irradiance_at(context, points, normals, 1024, seed=REFERENCE_SEED)
         samples.append(Sample(f"{height:g} m up", relative_rmse(field.irradiance(points, normals), exact.mean,
                                                                exact.standard_error**2), built, field))
     return samples

@@ -15,6 +15,7 @@ from .parts import box, brightness, grey, moved, point, quad, receivers, rotatio
 CELL, HALF = 0.5, np.array([2.0, 1.0, 1.0])
 TRILINEAR = Variant("plain trilinear", {LOOKUP: {"visibility": False, "normal_weight": False}})
 BACKFACE = Variant("normal weight alone", {LOOKUP: {"visibility": False}})
+FITTED = Variant("fitted to surfaces", {"fit": True}, remedy=True)
 VISIBLE = Variant("shadow rays to texels", {"visibility": True}, remedy=True)
 
 
@@ -106,14 +107,14 @@ CASES = (
     Case("wall-thickness", "light leaks through a thin wall", "two closed rooms side by side, a lamp in one",
          "mean irradiance of the dark room's walls over that of the lit room's; the truth is 0", "the wall's thickness",
          0.005, _wall_thickness,
-         {"probes": (TRILINEAR, BACKFACE), "rsm": (VISIBLE,), "lpv": (Variant("without blocking", {"blocking": False}),)}),
+         {"probes": (TRILINEAR, BACKFACE, FITTED), "rsm": (VISIBLE,), "lpv": (Variant("without blocking", {"blocking": False}),)}),
     Case("lattice-phase", "a leak that comes and goes with the lattice's position", "the two rooms, wall of 0.1 cells",
-         "as wall-thickness", "the lattice's phase against the wall", 0.005, _phase, {"probes": (TRILINEAR, BACKFACE)}),
+         "as wall-thickness", "the lattice's phase against the wall", 0.005, _phase, {"probes": (TRILINEAR, BACKFACE, FITTED)}),
     Case("lattice-rotation", "a leak that comes and goes with the lattice's rotation", "the two rooms, turned about a slanted axis",
-         "as wall-thickness", "the angle", 0.005, _rotation, {"probes": (TRILINEAR, BACKFACE)}),
+         "as wall-thickness", "the angle", 0.005, _rotation, {"probes": (TRILINEAR, BACKFACE, FITTED)}),
     Case("leak-feedback", "bounces feed a leak", "the two rooms with walls of albedo 0.9", "as wall-thickness",
-         "one bounce, then all", 0.005, _feedback),
+         "one bounce, then all", 0.005, _feedback, {"probes": (FITTED,)}),
     Case("baffle", "bounced light passes a baffle", "a spot before a baffle in the open; of one bounce nothing gets behind it",
          "irradiance behind over that on the baffle's lit face; the truth is 0", "none", 0.005, _baffle,
-         {"rsm": (VISIBLE,), "probes": (TRILINEAR, BACKFACE), "lpv": (Variant("without blocking", {"blocking": False}),)}),
+         {"rsm": (VISIBLE,), "probes": (TRILINEAR, BACKFACE, FITTED), "lpv": (Variant("without blocking", {"blocking": False}),)}),
 )

@@ -1,7 +1,7 @@
 """The suite on a user's own scene: what must not matter there (where the lattice lies, how it is turned, which random numbers are
 drawn, the scene's size, a lamp's creeping), and what a bake gets wrong against path tracing (leaks, energy).
 
-The scene stays as it is; its volumes and lamps are moved. Failures as in PHYSICS.md section 3.
+The scene stays as it is; its volumes and lamps are moved. Failures as in docs/physics.md §3.
 """
 
 from collections.abc import Callable
@@ -12,25 +12,30 @@ import numpy as np
 
 from ...numerics import grid as lattice
 from ...progress import Progress
-from ...scene import ProbeVolume, Scene, SunLight
+from ...scene import ProbeVolume, Scene
 from ...techniques import Field, get, names
+from ...techniques.lattice.focus import probes_of
 from ...transport.context import LightContext
+from ...transport.lights.kinds import kind_of
 from ..leaks import find_leaks
 from ..measure import scaled_resolution
 from ..receivers import Receivers, open_probes, surface_receivers
 from ..references import PathReference, Truth
 from .case import Bench, Case, Sample
-from .motion import FRAMES, TEXELS, flicker
-from .parts import brightness, moved, rotation
+from .motion import CREEP, FRAMES, TEXELS, flicker
+from .parts import brightness, moved, rms_change, rotation
 
 # Receivers, and the relative noise of the reference at them.
 POINTS, NOISE = 256, 0.02
 LEAK_POINTS = 1000
 SEEDS = 3
+# Angles by which the lattice is turned [degrees].
 ANGLES = (15.0, 45.0)
 # Shifts of the lattice, in cells along x, y and z.
 PHASES = ((0.5, 0.0, 0.0), (0.0, 0.5, 0.0), (0.0, 0.0, 0.5), (0.25, 0.25, 0.25))
 SIZES = (1e-3, 1e3)
+# How far a case is when its field is baked and is to be held to path tracing.
+_BAKED = 0.5
 OWN_NAMES = ("phase", "rotation", "refinement", "seeds", "size", "lamp-motion", "leaks", "energy")
 
 
@@ -50,21 +55,19 @@ class OwnScene:
     def receivers(self) -> Receivers:
         """Points of surfaces around the volumes, under their own normals."""
         volumes = self.scene.volumes
-        eyes = np.concatenate([lattice.lattice_points(one.world_from_local, one.resolution).reshape(-1, 3) for one in volumes])
-        return surface_receivers(self.context, eyes[open_probes(self.context, volumes)], self._points, 1, self._seed)
+        return surface_receivers(self.context, probes_of(volumes)[open_probes(self.context, volumes)], self._points, 1, self._seed)
 
     @cached_property
     def extent(self) -> float:
         """Diagonal [m] of the box around all volumes."""
-        corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float64)
-        box = np.concatenate([lattice.transform_points(one.world_from_local, corners) for one in self.scene.volumes])
+        box = np.concatenate([lattice.box_corners(volume.world_from_local) for volume in self.scene.volumes])
         return float(np.linalg.norm(np.ptp(box, axis=0)))
 
     def inside(self, volumes: tuple[ProbeVolume, ...]) -> np.ndarray:
         """(n,) bool: receivers inside one of ``volumes`` and one of the scene's own."""
         inside = np.ones(len(self.receivers.points), bool)
         for group in (self.scene.volumes, volumes):
-            local = [lattice.local_from_world(one.world_from_local, self.receivers.points) for one in group]
+            local = [lattice.local_from_world(volume.world_from_local, self.receivers.points) for volume in group]
             inside &= np.any([np.abs(points).max(axis=1) <= 1.0 for points in local], axis=0)
         return inside
 
@@ -97,7 +100,7 @@ def _moved_volumes(own: OwnScene, bench: Bench, steps: list[tuple[str, tuple[Pro
             continue
         changed = replace(own.scene, volumes=volumes)
         field = bench.bake(changed, **_settings(bench))
-        samples.append(Sample(name, _change(own.brightness(field, rows), own.brightness(before, rows)), changed, field))
+        samples.append(Sample(name, rms_change(own.brightness(field, rows), own.brightness(before, rows)), changed, field))
     return samples or [Sample("nothing was measured: no receiver stays inside", float("nan"))]
 
 
@@ -108,7 +111,7 @@ def _phase(own: OwnScene) -> Callable[[Bench], list[Sample]]:
         return replace(volume, world_from_local=shift @ volume.world_from_local)
 
     return lambda bench: _moved_volumes(own, bench, [
-        (f"{', '.join(f'{cell:g}' for cell in cells)} cells", tuple(shifted(one, cells) for one in own.scene.volumes))
+        (f"{', '.join(f'{cell:g}' for cell in cells)} cells", tuple(shifted(volume, cells) for volume in own.scene.volumes))
         for cells in PHASES])
 
 
@@ -119,7 +122,7 @@ def _rotation(own: OwnScene) -> Callable[[Bench], list[Sample]]:
         return replace(volume, world_from_local=turn @ volume.world_from_local)
 
     return lambda bench: _moved_volumes(own, bench, [
-        (f"{degrees:g} degrees", tuple(turned(one, degrees) for one in own.scene.volumes)) for degrees in ANGLES])
+        (f"{degrees:g} degrees", tuple(turned(volume, degrees) for volume in own.scene.volumes)) for degrees in ANGLES])
 
 
 def _refinement(own: OwnScene, bench: Bench) -> list[Sample]:
@@ -127,19 +130,19 @@ def _refinement(own: OwnScene, bench: Bench) -> list[Sample]:
     field = bench.bake(own.scene, **_settings(bench))
     finer, settings = own.scene, {}
     if bench.technique == "probes":
-        finer = replace(finer, volumes=tuple(replace(one, resolution=scaled_resolution(one.resolution, 2.0))
-                                             for one in finer.volumes))
+        finer = replace(finer, volumes=tuple(replace(volume, resolution=scaled_resolution(volume.resolution, 2.0))
+                                             for volume in finer.volumes))
     else:
         settings = _doubled(bench)
     again = bench.bake(finer, **{**_settings(bench), **settings})
-    return [Sample("twice as fine", _change(own.brightness(field), own.brightness(again)), own.scene, field)]
+    return [Sample("twice as fine", rms_change(own.brightness(field), own.brightness(again)), own.scene, field)]
 
 
 def _seeds(own: OwnScene, bench: Bench) -> list[Sample]:
     """The spread of irradiance over seeds."""
     fields = [replace(bench, seed=bench.seed + number).bake(own.scene, **_settings(bench)) for number in range(SEEDS)]
-    found = np.array([own.brightness(field) for field in fields])
-    spread = float(np.sqrt(found.var(axis=0, ddof=1).mean()) / found.mean())
+    seen = np.array([own.brightness(field) for field in fields])
+    spread = float(np.sqrt(seen.var(axis=0, ddof=1).mean()) / seen.mean())
     return [Sample(f"{SEEDS} seeds", spread if np.isfinite(spread) else np.inf, own.scene, fields[0])]
 
 
@@ -149,8 +152,8 @@ def _size(own: OwnScene, bench: Bench) -> list[Sample]:
     for scale in SIZES:
         grown = moved(own.scene, np.diag([scale, scale, scale, 1.0]), intensity=scale * scale)
         field = bench.bake(grown, **_settings(bench))
-        found = brightness(field, own.receivers.points * np.float32(scale), own.receivers.normals)
-        samples.append(Sample(f"{scale:g} times as large", _change(found, expected), grown, field))
+        seen = brightness(field, own.receivers.points * np.float32(scale), own.receivers.normals)
+        samples.append(Sample(f"{scale:g} times as large", rms_change(seen, expected), grown, field))
     return samples
 
 
@@ -158,11 +161,11 @@ def _lamp_motion(own: OwnScene, bench: Bench) -> list[Sample]:
     """Flicker as all lamps creep by a tenth of a texel of a map of the volumes a frame, and suns turn as slowly."""
     field, frames = None, []
     for step in range(FRAMES):
-        share = step * 0.1 / TEXELS
+        share = step * CREEP / TEXELS
         turn = rotation((0, 0, 1), np.degrees(share))[:3, :3]
         lights = []
         for light in own.scene.lights:
-            if isinstance(light, SunLight):
+            if kind_of(light).is_distant:
                 lights.append(replace(light, direction_world=(turn @ light.direction_world).astype(np.float32)))
             else:
                 away = np.float32([share * own.extent, 0, 0])
@@ -176,25 +179,18 @@ def _lamp_motion(own: OwnScene, bench: Bench) -> list[Sample]:
 def _leaks(own: OwnScene, bench: Bench) -> list[Sample]:
     """The share of receivers with light that should not be there."""
     field = bench.bake(own.scene, **_settings(bench))
-    found = find_leaks(own.context, field, LEAK_POINTS, bench.seed, bench.progress.span(0.5, 1.0))
-    counts = found.counts()
+    leaks = find_leaks(own.context, field, LEAK_POINTS, bench.seed, bench.progress.span(_BAKED, 1.0))
+    counts = leaks.counts()
     most = next(iter(counts)).text if counts else "nowhere"
-    return [Sample(most, sum(counts.values()) / max(len(found.cause), 1), own.scene, field)]
+    return [Sample(most, sum(counts.values()) / max(len(leaks.cause), 1), own.scene, field)]
 
 
 def _energy(own: OwnScene, bench: Bench) -> list[Sample]:
     """How far the light of all receivers together is from path tracing's."""
     field = bench.bake(own.scene, **_settings(bench))
-    true = own.truth(bench.technique, bench.progress.span(0.5, 1.0)).mean.mean(axis=1)
+    true = own.truth(bench.technique, bench.progress.span(_BAKED, 1.0)).mean.mean(axis=1)
     ratio = float(own.brightness(field).mean() / true.mean()) if true.mean() > 0 else np.inf
     return [Sample("too bright" if ratio > 1 else "too dark", abs(ratio - 1.0), own.scene, field)]
-
-
-def _change(found: np.ndarray, expected: np.ndarray) -> float:
-    """Root mean square of the difference over the mean; infinite where that is no number."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        value = float(np.sqrt(np.mean((found - expected) ** 2)) / expected.mean())
-    return value if np.isfinite(value) else float("inf")
 
 
 def _settings(bench: Bench) -> dict:
@@ -204,7 +200,8 @@ def _settings(bench: Bench) -> dict:
 def _doubled(bench: Bench) -> dict:
     defaults = get(bench.technique).Settings()
     return {name: 2 * getattr(defaults, name) for name in
-            {"vpl": ("lights",), "rsm": ("resolution", "samples"), "lpv": ("resolution", "steps")}[bench.technique]}
+            {"vpl": ("lights",), "rsm": ("resolution", "samples"), "lpv": ("resolution", "steps"),
+             "cone_tracing": ("resolution",), "voxel_march": ("resolution", "rays")}[bench.technique]}
 
 
 _FINER_LATTICE = "raise the volume's resolution, or lay its layers half a cell off walls and floors"
@@ -216,8 +213,9 @@ _WALLS = "make the wall thicker than half a cell, give both rooms volumes of the
 
 def _cases(own: OwnScene) -> dict[str, Case]:
     scene, file = f"the scene {own.scene.name}", own.scene.source or f"{own.scene.name}.blend"
-    on_lattices = {"probes": _FINER_LATTICE, "lpv": _FINER_CELLS}
-    everywhere = {"probes": "lower its target error", "vpl": _LIGHTS, "rsm": _SAMPLES, "lpv": _FINER_CELLS}
+    on_lattices = {"probes": _FINER_LATTICE, **dict.fromkeys(("lpv", "cone_tracing", "voxel_march"), _FINER_CELLS)}
+    everywhere = {"probes": "lower its target error", "vpl": _LIGHTS, "rsm": _SAMPLES,
+                  **dict.fromkeys(("lpv", "cone_tracing", "voxel_march"), _FINER_CELLS)}
 
     def case(name, failure, metric, sweep, goal, measure, remedies) -> Case:
         return Case(name, failure, scene, metric, sweep, goal, measure, file=file,
@@ -238,8 +236,9 @@ def _cases(own: OwnScene) -> dict[str, Case]:
              "over the mean", "the lamps", 0.005, lambda bench: _lamp_motion(own, bench), everywhere),
         case("leaks", "light where none should be", "share of points of the surfaces that leak (the worst cause is named)", "none",
              0.01, lambda bench: _leaks(own, bench),
-             {"probes": _WALLS, "vpl": _LIGHTS, "rsm": "trace shadow rays: --set visibility=true", "lpv": _WALLS}),
+             {"probes": _WALLS, "vpl": _LIGHTS, "rsm": "trace shadow rays: --set visibility=true", "lpv": _WALLS,
+              "cone_tracing": _WALLS, "voxel_march": _WALLS}),
         case("energy", "more or less light than there is", "deviation of the mean irradiance from path tracing of the light that "
              "the technique knows", "none", 0.05, lambda bench: _energy(own, bench), everywhere),
     )
-    return {one.name: one for one in cases}
+    return {known.name: known for known in cases}

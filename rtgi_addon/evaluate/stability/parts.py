@@ -15,6 +15,8 @@ _SIDES = np.array([[0, 2, 3], [0, 3, 1], [4, 5, 7], [4, 7, 6], [0, 1, 5], [0, 5,
 ONE = np.ones(3)
 # Receivers keep this share of the room's side from its edges, unless told otherwise.
 MARGIN = 0.1
+# The seed of path traced references, which is none of the bakes'.
+REFERENCE_SEED = 7
 
 
 def box(name: str, low, high, material: int = 0, inward: bool = False) -> Mesh:
@@ -38,12 +40,13 @@ def sphere(name: str, radius: float, rings: int = 24, inward: bool = True, mater
                        np.repeat(np.cos(polar)[:, None], 2 * rings, axis=1)], axis=-1).reshape(-1, 3)
     vertices = radius * np.concatenate([around, [[0, 0, 1], [0, 0, -1]]])
     row, column = (index.ravel() for index in np.meshgrid(np.arange(rings - 2), np.arange(2 * rings), indexing="ij"))
-    a, b = row * 2 * rings + column, row * 2 * rings + (column + 1) % (2 * rings)
-    c, d = a + 2 * rings, b + 2 * rings
+    here, beside = row * 2 * rings + column, row * 2 * rings + (column + 1) % (2 * rings)
+    below, across = here + 2 * rings, beside + 2 * rings
     first, second = np.arange(2 * rings), (np.arange(2 * rings) + 1) % (2 * rings)
     last = (rings - 2) * 2 * rings
     triangles = np.concatenate([
-        np.stack([a, c, b], 1), np.stack([b, c, d], 1), np.stack([np.full_like(first, len(around)), first, second], 1),
+        np.stack([here, below, beside], 1), np.stack([beside, below, across], 1),
+        np.stack([np.full_like(first, len(around)), first, second], 1),
         np.stack([np.full_like(first, len(around) + 1), last + second, last + first], 1)])
     return mesh(name, vertices, triangles[:, ::-1] if inward else triangles, material)
 
@@ -99,12 +102,12 @@ def moved(scene_: Scene, world_from_old: np.ndarray, *, volumes: bool = True, in
     """``scene_`` under a similarity ``world_from_old`` (4, 4), its probe volumes left behind unless ``volumes``; lamps' intensities
     times ``intensity``."""
     scale = float(np.cbrt(np.linalg.det(world_from_old[:3, :3])))
-    instances = tuple(replace(one, world_from_local=world_from_old @ one.world_from_local) for one in scene_.instances)
-    taken = scene_.volumes
-    if volumes:
-        taken = tuple(replace(one, world_from_local=world_from_old @ one.world_from_local) for one in taken)
+    def placed(items):
+        return tuple(replace(item, world_from_local=world_from_old @ item.world_from_local) for item in items)
+
     lights = tuple(_moved_light(light, world_from_old, scale, intensity) for light in scene_.lights)
-    return replace(scene_, instances=instances, lights=lights, volumes=taken)
+    return replace(scene_, instances=placed(scene_.instances), lights=lights,
+                   volumes=placed(scene_.volumes) if volumes else scene_.volumes)
 
 
 def _moved_light(light: Light, world_from_old: np.ndarray, scale: float, intensity: float) -> Light:
@@ -131,12 +134,12 @@ def receivers(low, high, side: int = 4, margin: float = MARGIN) -> tuple[np.ndar
     They form a grid a wall that keeps ``margin`` of its sides from its edges."""
     low, high = np.asarray(low, np.float64), np.asarray(high, np.float64)
     along = margin + (1 - 2 * margin) * (np.arange(side) + 0.5) / side
-    a, b = (grid.ravel() for grid in np.meshgrid(along, along))
+    across, up = (grid.ravel() for grid in np.meshgrid(along, along))
     points, normals = [], []
     for axis in range(3):
         for end in (0.0, 1.0):
             local = np.empty((side * side, 3))
-            local[:, axis], local[:, (axis + 1) % 3], local[:, (axis + 2) % 3] = end, a, b
+            local[:, axis], local[:, (axis + 1) % 3], local[:, (axis + 2) % 3] = end, across, up
             points.append(low + local * (high - low))
             normals.append(np.broadcast_to(np.eye(3)[axis] * (1 - 2 * end), local.shape))
     return np.concatenate(points).astype(np.float32), np.concatenate(normals).astype(np.float32)
@@ -152,6 +155,13 @@ def turned(points: np.ndarray, normals: np.ndarray, world_from_old: np.ndarray) 
 def brightness(field, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """Irradiance (n,) float64 by ``field``, averaged over the channels."""
     return np.asarray(field.irradiance(points, normals), np.float64).mean(axis=1)
+
+
+def rms_change(found: np.ndarray, expected: np.ndarray) -> float:
+    """Root mean square of the difference over the mean of what was ``expected``; infinite where that is no number."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        value = float(np.sqrt(np.mean((found - expected) ** 2)) / expected.mean())
+    return value if np.isfinite(value) else float("inf")
 
 
 def room_with_block(side: int = 4) -> Scene:

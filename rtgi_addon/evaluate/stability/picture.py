@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ...storage.png import write_png
 from ...transport.context import LightContext
 from ...transport.vectors import dot, luminance
-from ..png import write_png
 from ..view import choose_view
 from .case import Result, Sample
 
@@ -34,7 +34,7 @@ def draw_result(result: Result, path) -> Path | None:
     exposure = BRIGHTNESS / max(float(np.quantile(lit, EXPOSED)) if lit.size else 0.0, 1e-30)
     shown = [np.where(np.isfinite(half), half * exposure, BACKDROP) for half in halves]
     gap = np.full((HALF[1], GAP, 3), 1.0, np.float32)
-    picture = np.concatenate([part for half in shown for part in (gap, half)][1:], axis=1)
+    picture = np.concatenate([column for half in shown for column in (gap, half)][1:], axis=1)
     encoded = np.clip(picture, 0.0, 1.0) ** (1.0 / 2.2)
     return write_png(path, np.round(255.0 * encoded).astype(np.uint8))
 

@@ -4,7 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...errors import BakeError
+from ...words import as_lines
 from .case import ABOVE, HOLDS, WEAK, WORSE, Result
+
+SCHEMA = "rtgi-stability/1"
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,9 +28,23 @@ class StabilityReport:
         """The results that passed their bound."""
         return [result for result in self.results if result.verdict == WORSE]
 
+    @property
+    def refusal(self) -> BakeError | None:
+        """Why a run of it has failed, or None: bounds that were passed."""
+        if not self.worse:
+            return None
+        names = ", ".join(f"{result.case.name} of {result.technique} ({result.figure:.3g}, bound {result.limit.bound:g})"
+                          for result in self.worse)
+        return BakeError(f"worse than the stored bounds: {names}", f"see it alone with: {self.worse[0].command}")
+
+    @property
+    def _on_own_scene(self) -> bool:
+        """Whether the cases are those of a user's own scene, which have no bounds."""
+        return any(result.case.remedies is not None for result in self.results)
+
     def to_json(self) -> dict:
         """Everything measured, as JSON-able values."""
-        return {"schema": "rtgi-stability/1", "seed": self.seed, "out": self.out, "complete": not self.cancelled,
+        return {"schema": SCHEMA, "seed": self.seed, "out": self.out, "complete": not self.cancelled,
                 "cases": [self._json(result) for result in self.results],
                 "variants": [{**self._json(result), "variant": result.variant.name, "remedy": result.variant.remedy}
                              for result in self.variants]}
@@ -50,26 +68,25 @@ class StabilityReport:
         lines += [f"{result.case.name:18} {result.technique:7} {_number(result.figure):>8}  {_kind(result)} {result.variant.name}"
                   for result in self.variants]
         verdicts = [result.verdict for result in self.results]
-        own = any(result.case.remedies is not None for result in self.results)
-        counts = ", ".join(f"{verdicts.count(verdict)} {verdict}" for verdict in ((HOLDS, ABOVE) if own else (HOLDS, WEAK, WORSE)))
+        known = (HOLDS, ABOVE) if self._on_own_scene else (HOLDS, WEAK, WORSE)
+        counts = ", ".join(f"{verdicts.count(verdict)} {verdict}" for verdict in known)
         lines += [f"  {result.case.name} of {result.technique}: {result.limit.why}" for result in self.results
                   if result.verdict == ABOVE]
-        return "\n".join([*lines, counts + (f"; the report is in {self.out}" if self.out else "")])
+        return as_lines([*lines, counts + (f"; the report is in {self.out}" if self.out else "")])
 
     def to_markdown(self) -> str:
         """The whole report."""
-        own = any(result.case.remedies is not None for result in self.results)
-        above = ("what makes it smaller stands below each table" if own
+        above = ("what makes it smaller stands below each table" if self._on_own_scene
                  else "*known weakness*: above it, within the technique's own bound; *worse*: above that")
         lines = ["# Stability", "", f"Every figure is 0 where nothing fails. *holds*: within the case's goal; {above}. Seed "
                  f"{self.seed}." + (" **Cancelled before its end.**" if self.cancelled else ""), ""]
         names = list(dict.fromkeys(result.technique for result in self.results))
         lines += ["| case | goal | " + " | ".join(names) + " |", "|---|---:|" + "---:|" * len(names)]
         for case in dict.fromkeys(result.case for result in self.results):
-            found = {result.technique: result for result in self.results if result.case is case}
-            cells = [f"{_number(found[name].figure)}{_MARKS[found[name].verdict]}" if name in found else "" for name in names]
+            row = {result.technique: result for result in self.results if result.case is case}
+            cells = [f"{_number(row[name].figure)}{_MARKS[row[name].verdict]}" if name in row else "" for name in names]
             lines.append(f"| [{case.name}](#{case.name}) | {_number(case.goal)} | " + " | ".join(cells) + " |")
-        lines += ["", "Unmarked: holds. `*`: above its goal." if own
+        lines += ["", "Unmarked: holds. `*`: above its goal." if self._on_own_scene
                   else "Unmarked: holds. `*`: known weakness. `!`: worse than its bound."]
         for case in dict.fromkeys(result.case for result in self.results):
             lines += self._section(case)

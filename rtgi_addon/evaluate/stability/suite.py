@@ -5,10 +5,13 @@ from collections.abc import Iterable
 
 from ...errors import BakeError, UsageError
 from ...progress import Progress
-from . import energy, geometry, leaks, motion
+from . import energy, geometry, leaks, live, media, motion, reflections, scattered, spheres, style, voxels
 from .case import Bench, Case, Result, Sample, Variant
 
-CASES: dict[str, Case] = {case.name: case for family in (leaks, geometry, energy, motion) for case in family.CASES}
+CASES: dict[str, Case] = {case.name: case
+                          for family in (leaks, geometry, energy, motion, live, style, media, reflections, spheres, voxels,
+                                         scattered)
+                          for case in family.CASES}
 
 
 def chosen(cases: Iterable[str] | None = None, techniques: Iterable[str] | None = None,

@@ -1,24 +1,20 @@
-"""Exports to engines: one file or folder each, discovered here; adding one is adding one file that ends in `ENGINE = Name()`."""
+"""Exports to engines: one file or folder each, discovered here. An engine comes in as a file that ends in ``ENGINE = Name()``, or
+as a folder with the textures, shaders and scripts that it writes; what several engines need is in `axes`, `volumes` and
+`conformance`.
+"""
 
-import importlib
-import pkgutil
 from functools import cache
 
-from ...errors import UsageError
-from .base import Engine, ExportReport, ExportSettings
+from ...discovery import discover, named
+from .base import PARTS, Engine, ExportReport, ExportSettings
 
-__all__ = ["Engine", "ExportReport", "ExportSettings", "get", "names", "registry"]
+__all__ = ["PARTS", "Engine", "ExportReport", "ExportSettings", "get", "names", "registry", "taking_styles"]
 
 
 @cache
 def registry() -> dict[str, Engine]:
     """Every engine found in this folder, by name, in alphabetical order."""
-    found = {}
-    for info in pkgutil.iter_modules(__path__):
-        engine = getattr(importlib.import_module(f"{__name__}.{info.name}"), "ENGINE", None)
-        if engine is not None:
-            found[engine.name] = engine
-    return dict(sorted(found.items()))
+    return discover(__name__, __path__, "ENGINE")
 
 
 def names() -> list[str]:
@@ -26,9 +22,12 @@ def names() -> list[str]:
     return list(registry())
 
 
+def taking_styles() -> list[str]:
+    """The names of the engines that take a style."""
+    return [name for name, engine in registry().items() if engine.styles]
+
+
 def get(name: str) -> Engine:
     """The engine called ``name``, by its name or one of its aliases. Raises UsageError with the list of known ones."""
-    for engine in registry().values():
-        if name == engine.name or name in engine.aliases:
-            return engine
-    raise UsageError(f"unknown engine {name!r}", f"choose one of {', '.join(registry())}")
+    aliases = {alias: engine.name for engine in registry().values() for alias in engine.aliases}
+    return named(registry(), aliases.get(name, name), "engine")

@@ -6,14 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
-from ..files import write_atomically
+from ...storage.writing import write_file
 
 _HEADER, _CHUNK = struct.Struct("<4sII"), struct.Struct("<I4s")
 _PUNCTUAL = "KHR_lights_punctual"
 
 
-def set_lamps(path: Path, lamps: dict[str, np.ndarray]) -> None:
-    """Give the punctual lights of the .glb at ``path`` the strengths (3,) of ``lamps`` by name; others stay.
+def correct(path: Path, lamps: dict[str, np.ndarray], names: dict[str, str]) -> None:
+    """Give the punctual lights of the .glb at ``path`` the strengths (3,) of ``lamps`` by name, and its nodes and meshes the
+    ``names`` that theirs stand for; others stay.
 
     A strength is radiant intensity [W/sr] for points and spots, irradiance [W/m^2] for suns: what probes are baked with. Raises
     OSError.
@@ -28,8 +29,10 @@ def set_lamps(path: Path, lamps: dict[str, np.ndarray]) -> None:
             # glTF keeps colours within 0 and 1, so the strength is that of the strongest channel.
             light["intensity"] = float(np.max(strength))
             light["color"] = (np.asarray(strength, np.float64) / max(light["intensity"], 1e-30)).tolist()
+    for part in (*content.get("nodes", ()), *content.get("meshes", ())):
+        part["name"] = names.get(part.get("name"), part.get("name", ""))
     text = json.dumps(content, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
     magic, version, _ = _HEADER.unpack_from(data)
     header = _HEADER.pack(magic, version, start + len(text) + len(rest))
-    write_atomically(path, header + _CHUNK.pack(len(text), b"JSON") + text + rest)
+    write_file(path, header + _CHUNK.pack(len(text), b"JSON") + text + rest)

@@ -7,6 +7,7 @@ from ...scene import Scene
 from ..capture import Drawn
 from ..device import uniform_buffer
 from ..indirect_pass import draw_indirect
+from ..packing import FOLD_WIDTH
 from ..program import Program
 from ..textures import download, empty, upload
 from .tables import UNIFORMS, Tables
@@ -16,14 +17,16 @@ class FieldLight:
     """The indirect light of one field, for ``indirect_pass.draw_indirect``: ``program``, ``uniforms`` and ``samplers`` as asked
     for there, of which each may change when the scene is followed.
 
-    ``includes_direct`` says that the light of lamps is in it already; ``error`` why it does not follow the scene, or None. GPU
-    objects: main thread only.
+    ``direct_lamps`` names the lamps whose direct light is in it already, as in Field; ``error`` says why it does not follow the
+    scene, or is None. GPU objects: main thread only.
     """
 
     captures = False
+    # Whether ``follow`` also asks what of the surfaces changed, as what they emit.
+    follows_surfaces = False
 
-    def __init__(self, tables: Tables, includes_direct: bool = False):
-        self.includes_direct = includes_direct
+    def __init__(self, tables: Tables, direct_lamps: frozenset[str] | None = frozenset()):
+        self.direct_lamps = direct_lamps
         self.error: str | None = None
         self.set(tables)
 
@@ -58,11 +61,11 @@ class FieldLight:
 def irradiance(light, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """Irradiance (n, 3) float32 [W·m⁻²] of ``light`` (an indirect_pass.Indirect) at ``points`` (n, 3) with unit ``normals``
     (n, 3), as the GPU has it."""
-    n = len(points)
-    width = max(min(n, 1024), 1)
-    receivers = np.zeros((2, max(-(-n // width), 1) * width, 4), np.float32)
-    receivers[0, :n, :3], receivers[1, :n, :3] = points, normals
+    count = len(points)
+    width = max(min(count, FOLD_WIDTH), 1)
+    receivers = np.zeros((2, max(-(-count // width), 1) * width, 4), np.float32)
+    receivers[0, :count, :3], receivers[1, :count, :3] = points, normals
     position, normal = (upload(rows.reshape(-1, width, 4)) for rows in receivers)
     target = empty(width, position.height)
     draw_indirect(light, {"position": position, "normal": normal}, target)
-    return download(target).reshape(-1, 4)[:n, :3].copy()
+    return download(target).reshape(-1, 4)[:count, :3].copy()

@@ -6,7 +6,7 @@ import numpy as np
 from ...progress import Progress
 from ...scene import Scene
 from ...techniques.kernels import NUMPY
-from ...techniques.lpv.bake import LpvBake
+from ...techniques.lpv.bake import bake_field
 from ...techniques.lpv.field import LpvField
 from ...techniques.lpv.grid import LpvGrid
 from ...techniques.lpv.settings import LpvSettings
@@ -74,4 +74,4 @@ class LpvLight(RelitLight):
         if bake is not None and not changed_surfaces(bake.context.scene, scene):
             return bake.relight(scene, progress, NUMPY)
         seed = _SEED if bake is None else bake.seed
-        return LpvBake(LightContext(scene), self._settings, seed, NUMPY, progress.span(0.0, 0.4)).light(progress.span(0.4, 1.0))
+        return bake_field(LightContext(scene), self._settings, seed, NUMPY, progress)

@@ -4,19 +4,22 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...scene import Medium
 from ...techniques.kernels import NUMPY
 from ...techniques.rsm.field import RsmField, map_views
 from ...techniques.rsm.gather import MAX_SLANT, Pattern, places, shared_samples
 from ...techniques.rsm.settings import RsmSettings
-from ...transport.shadow_views import texel_power
 from ...transport.vectors import luminance
+from ...transport.views.shadow_views import texel_power
 from ..capture import CapturedTextures, Drawn, draw_capture
 from ..device import dispatch, uniform_buffer
-from ..programs import RSM_QUANTIZE, RSM_STORE, RSM_SUM_ROWS
+from ..media_textures import MediaTextures
+from ..programs import RSM_QUANTIZE, RSM_STORE, RSM_SUM_ROWS, indirect_program
 from ..textures import empty, upload
 from .base import FieldLight
+from .probes import grid_tables
 from .relighting import RelitLight
-from .rsm import STRUCT, Sheet, least_of, map_rows, map_tables, pattern_rows, rsm_values
+from .rsm import IN_MEDIA, STRUCT, Sheet, least_of, map_rows, map_tables, media_between, pattern_rows, rsm_values
 from .tables import UNIFORMS
 
 
@@ -24,8 +27,7 @@ def rsm_light(field: RsmField, samples: int | None) -> FieldLight:
     """The irradiance function of ``field``. One whose every sample has a shadow ray is read from its probe grids instead: a shader
     has no rays."""
     if not field.capture.settings.visibility:
-        return RsmLight(field.capture.settings, field.pattern, samples, field.maps)
-    from . import grid_tables
+        return RsmLight(field.capture.settings, field.pattern, samples, field.maps, media_between(field.capture.context.scene))
 
     def relight(scene, progress):
         # A worker's kernels are numpy's: Blender's GPU works on the main thread only.
@@ -41,20 +43,21 @@ def live_rsm_light(settings: RsmSettings, samples: int | None) -> "RsmLight":
 
 class RsmLight(FieldLight):
     """``maps``, and then those of the scenes that are captured, read by ``pattern``, with ``samples`` texels a lamp (None: the
-    pattern's)."""
+    pattern's), through ``media``."""
 
     captures = True
 
-    def __init__(self, settings: RsmSettings, pattern: Pattern, samples: int | None = None, maps: tuple = ()):
-        self._settings, self._least = settings, least_of(samples)
+    def __init__(self, settings: RsmSettings, pattern: Pattern, samples: int | None = None, maps: tuple = (),
+                 media: tuple[Medium, ...] = ()):
+        self._settings, self._least, self._media = settings, least_of(samples), MediaTextures()
         self._pattern = pattern if samples is None else replace(pattern, samples=samples)
-        super().__init__(map_tables(maps, self._pattern, self._least))
+        super().__init__(map_tables(maps, self._pattern, self._least, media))
 
     def capture(self, drawn: Drawn) -> bool:
         """See FieldLight."""
         # Nothing to meet: views would be fitted to no extent.
-        views = [] if drawn.surfaces is None else [view for own in map_views(drawn.scene, drawn.bounds, self._settings)
-                                                   for view in own]
+        views = [] if drawn.surfaces is None else [view for of_lamp in map_views(drawn.scene, drawn.bounds, self._settings)
+                                                   for view in of_lamp]
         # By what the lamp sends through each map: what that meets is known to the GPU only.
         strength = np.array([float(luminance(texel_power(drawn.scene.lights[view.lamp], view).sum(axis=(0, 1), dtype=np.float64)))
                              for view in views])
@@ -68,7 +71,11 @@ class RsmLight(FieldLight):
             _store(draw_capture(drawn, view), place, texels, cumulative)
         self.samplers = {"texels": texels, "cumulative": cumulative, "maps": upload(map_rows(views, sheet, parts)),
                          "pattern": upload(pattern_rows(parts))}
-        self.uniforms = {UNIFORMS: uniform_buffer(STRUCT, rsm_values(len(views), self._pattern))}
+        media = media_between(drawn.scene)
+        if media:
+            self.samplers.update(self._media.of(media).samplers)
+        self.program = indirect_program("indirect_rsm", ((UNIFORMS, STRUCT),), tuple(self.samplers), IN_MEDIA if media else ())
+        self.uniforms = {UNIFORMS: uniform_buffer(STRUCT, rsm_values(len(views), self._pattern, len(media)))}
         self.error = None
         return True
 

@@ -12,14 +12,15 @@ import numpy as np
 from ...techniques.kernels import NUMPY
 from ...techniques.lpv import sources
 from ...techniques.lpv.bake import LpvBake, reflected
-from ...techniques.lpv.grid import LpvGrid
+from ...techniques.lpv.grid import LOBE_VECTOR, LpvGrid
+from ...techniques.lpv.injection import INJECTION_CELLS
 from ..capture import CapturedTextures, Drawn, draw_capture
 from ..device import RenderTarget, bind, dispatch, uniform_buffer, vertex_buffer
 from ..light_volume import FaceTextures, LightTextures, propagate_light, upload_light
 from ..packing import FLUX_SCALE
 from ..programs import LPV_INJECT_MAP, LPV_STORE, lpv_cascades, lpv_inject_border
-from ..textures import empty
-from .lpv import CHANNELS, Stack, lpv_values
+from ..textures import empty, upload
+from .lpv import CHANNELS, Stack, lpv_values, stacked_walls
 
 
 class LiveVolumes:
@@ -33,11 +34,12 @@ class LiveVolumes:
         emissive = sources.emissive_lights(bake.context, bake.seed)
         self._cascades = []
         for grid, blocking, seen, atlas in zip(bake.grids, bake.blocking, world, self._stack.atlases, strict=True):
-            steady = NUMPY.lpv_inject(grid, *emissive)
+            steady = NUMPY.lpv_inject(grid, *emissive, blocking.faces)
             if seen.any() and blocking.reflectance is not None:
                 steady = steady + reflected(seen, blocking, NUMPY, bake.context.threads)
             self._cascades.append((FaceTextures(grid.resolution, blocking), upload_light(steady, atlas, FLUX_SCALE),
                                    upload_light(seen, atlas)))
+        self._walls = upload(stacked_walls(self._stack, tuple(blocking.faces for blocking in bake.blocking)))
         self._borders = [_border(grid) for grid in bake.grids[:-1]]
         self._uniforms = uniform_buffer(lpv_cascades(len(bake.grids)), lpv_values(bake.grids, self._stack, False))
         self._texels: dict[int, gpu.types.GPUBatch] = {}
@@ -47,14 +49,14 @@ class LiveVolumes:
 
     @property
     def textures(self) -> dict[str, gpu.types.GPUTexture]:
-        """The atlases of all cascades, a colour channel each."""
-        return _named("light", self._stored)
+        """The atlases of all cascades, a colour channel each, and of their walls."""
+        return {**_named("light", self._stored), "walls": self._walls}
 
     def light(self, drawn: Drawn) -> None:
         """Fill the volumes with what the lamps of ``drawn`` light. Its world is the bake's; where its objects are not, light falls
         on them where they are, and is blocked and reflected where they were."""
         views = sources.map_views(drawn.scene, drawn.bounds, self._grids, self._bake.settings.map_resolution)
-        maps = [draw_capture(drawn, view) for own in views for view in own]
+        maps = [draw_capture(drawn, view) for of_lamp in views for view in of_lamp]
         for level in reversed(range(len(self._grids))):
             atlas, (faces, steady, world) = self._stack.atlases[level], self._cascades[level]
             injected = self._inject(level, maps)
@@ -69,17 +71,19 @@ class LiveVolumes:
     def _inject(self, level: int, maps: list[CapturedTextures]) -> LightTextures:
         """Fluxes of what ``maps`` reflect into a cascade, and of what the coarser ones send through its border."""
         grid, atlas = self._grids[level], self._stack.atlases[level]
-        values = {"resolution": grid.resolution, "columns": atlas.columns, "size": atlas.size, "per_flux": 1.0, "per_vector": 1.0,
-                  "corner": grid.corner, "cell": grid.cell, "level": level}
+        values = {"resolution": grid.resolution, "columns": atlas.columns, "size": atlas.size, "per_flux": 1.0,
+                  "per_vector": LOBE_VECTOR, "corner": grid.corner, "cell": grid.cell, "level": level, "distance": INJECTION_CELLS}
+        level_walls = {"level_walls": self._cascades[level][0].faces}
         target = RenderTarget(*atlas.size, ("RGBA32F",) * 3)
         with target.drawing(blend="ADDITIVE_PREMULT"):
             gpu.state.program_point_size_set(True)
             for item in maps:
-                samplers = {"map_position": item.position, "map_normal": item.normal, "map_flux": item.flux}
+                samplers = {"map_position": item.position, "map_normal": item.normal, "map_flux": item.flux, **level_walls}
                 shader, _alive = bind(LPV_INJECT_MAP, uniforms={"parameters": values}, samplers=samplers)
                 self._points(item.view.resolution**2).draw(shader)
             if level < len(self._borders):
-                shader, _alive = bind(lpv_inject_border(len(self._grids)), samplers=_named("light", self._propagated),
+                samplers = {**_named("light", self._propagated), "walls": self._walls, **level_walls}
+                shader, _alive = bind(lpv_inject_border(len(self._grids)), samplers=samplers,
                                       uniforms={"parameters": values, "indirect": self._uniforms})
                 self._borders[level].draw(shader)
             gpu.state.program_point_size_set(False)

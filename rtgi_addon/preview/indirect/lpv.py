@@ -4,9 +4,10 @@ import numpy as np
 
 from ...techniques.lpv.cascades import BLEND_CELLS
 from ...techniques.lpv.field import LpvField
-from ...techniques.lpv.gather import BEHIND_CELLS, FACE_AHEAD, FACE_TOTAL, SURFACE_CELLS
+from ...techniques.lpv.gather import SURFACE_CELLS, irradiance_factors
 from ...techniques.lpv.grid import LpvGrid
 from ..atlas import Atlas
+from ..packing import wall_texels
 from ..programs import lpv_cascades
 from .tables import Tables
 
@@ -22,15 +23,23 @@ class Stack:
         self.size = max(atlas.size[0] for atlas in self.atlases), sum(atlas.size[1] for atlas in self.atlases)
 
 
+def stacked_walls(stack: Stack, faces: tuple[np.ndarray | None, ...]) -> np.ndarray:
+    """The ``faces`` of every cascade as texels, for include/standing.glsl."""
+    width, height = stack.size
+    texels = np.zeros((height, 2 * width, 4), np.float32)
+    for of_grid, atlas, row in zip(faces, stack.atlases, stack.rows, strict=True):
+        for column, half in zip((0, width), np.split(wall_texels(atlas, of_grid), 2, axis=1), strict=True):
+            texels[row:row + atlas.size[1], column:column + atlas.size[0]] = half
+    return texels
+
+
 def lpv_values(grids: tuple[LpvGrid, ...], stack: Stack, dampening: bool) -> dict:
     """Values of ``programs.lpv_cascades``."""
-    # Factors of coefficients 0 and 1 to 3: SH constants, the faces' solid angles, over the area of a face.
-    total, along = np.sqrt(0.25 / np.pi) * FACE_TOTAL, np.sqrt(0.75 / np.pi) * FACE_AHEAD
     return {
         "corner": [(*grid.corner, grid.cell) for grid in grids],
         "resolution": [(*grid.resolution, atlas.columns) for grid, atlas in zip(grids, stack.atlases, strict=True)],
-        "factors": [(total / grid.cell**2, along / grid.cell**2, row, 0.0) for grid, row in zip(grids, stack.rows, strict=True)],
-        "surface_cells": SURFACE_CELLS, "behind": BEHIND_CELLS, "blend_cells": BLEND_CELLS, "dampening": int(dampening),
+        "factors": [(*irradiance_factors(grid), row, 0.0) for grid, row in zip(grids, stack.rows, strict=True)],
+        "surface_cells": SURFACE_CELLS, "blend_cells": BLEND_CELLS, "dampening": int(dampening),
     }
 
 
@@ -41,6 +50,7 @@ def lpv_tables(field: LpvField) -> Tables:
     for volume, atlas, row in zip(field.volumes, stack.atlases, stack.rows, strict=True):
         for channel in range(3):
             light[channel, row:row + atlas.size[1], :atlas.size[0]] = atlas.pack(np.moveaxis(volume[:, channel], 0, -1))
-    return Tables("indirect_lpv", lpv_cascades(len(grids)), lpv_values(grids, stack, field.params.get("dampening", True)),
-                  {f"light_{name}": light[channel] for channel, name in enumerate(CHANNELS)},
+    return Tables("indirect_lpv", lpv_cascades(len(grids)), lpv_values(grids, stack, field.params.get("dampening", False)),
+                  {**{f"light_{name}": light[channel] for channel, name in enumerate(CHANNELS)},
+                   "walls": stacked_walls(stack, field.faces)},
                   (("LPV_CASCADES", str(len(grids))),))

@@ -30,3 +30,7 @@ class Tables:
     def program(self) -> Program:
         """The program that fills an image of irradiance."""
         return indirect_program(self.name, ((UNIFORMS, self.struct),), tuple(self.textures), self.defines)
+
+
+# No light.
+DARK = Tables("indirect_dark", UniformStruct("NoLight", (("float", "radiance"),)), {"radiance": 0.0}, {})

@@ -9,12 +9,16 @@ import numpy as np
 
 from ...numerics.sampling import frame, hash_u32
 from ...techniques.vpl.field import VplField
-from ...transport.rays import SELF_INTERSECTION
+from ...transport.rays.tracer import SELF_INTERSECTION
 from ..packing import fold, light_rows
 from ..uniforms import UniformStruct
 from .tables import Tables
 from .vpl_shadows import DISTANT_SIDE, DISTANT_TOLERANCE, SIDE, TOLERANCE, SeenPlanes, focus
 
+# Tells the turns of receivers apart from all other numbers: the letters vpl.
+_STREAM = 0x76706C
+# A bound that no geometry term reaches, as a float holds it.
+_NO_CLAMP = np.float32(3e38)
 STRUCT = UniformStruct("VirtualLights", (
     ("vec4", "focus"), ("int", "count"), ("int", "distant_count"), ("int", "stride"), ("float", "clamp_at"),
     ("int", "side"), ("int", "distant_side"), ("float", "tolerance"), ("float", "distant_tolerance"),
@@ -29,12 +33,12 @@ def vpl_tables(field: VplField, samples: int | None = None, seen: SeenPlanes | N
     total = lights.count + lights.distant_count
     stride = 1 if samples is None else max(1, -(-total // samples))
     distant = np.zeros((lights.distant_count, 16), np.float32)
-    for column, part in enumerate((lights.directions, lights.irradiance, *frame(lights.directions))):
-        distant[:, 4 * column:4 * column + 3] = part
+    for column, vectors in enumerate((lights.directions, lights.irradiance, *frame(lights.directions))):
+        distant[:, 4 * column:4 * column + 3] = vectors
     values = {"focus": (*centre, radius), "count": lights.count, "distant_count": lights.distant_count, "stride": stride,
-              "clamp_at": np.float32(3e38) if clamp is None else clamp, "side": SIDE, "distant_side": DISTANT_SIDE,
+              "clamp_at": _NO_CLAMP if clamp is None else clamp, "side": SIDE, "distant_side": DISTANT_SIDE,
               "tolerance": TOLERANCE, "distant_tolerance": DISTANT_TOLERANCE * 2.0 * radius / DISTANT_SIDE,
-              "self_intersection": SELF_INTERSECTION, "seed_state": int(hash_u32(0x76706C))}
+              "self_intersection": SELF_INTERSECTION, "seed_state": int(hash_u32(_STREAM))}
     seen = seen or SeenPlanes()
     planes = seen.of_lights(context, lights.positions, lights.normals)
     distant_seen = seen.of_distant(context, lights.directions)

@@ -8,11 +8,11 @@ its very back; what a texel misses is the edge of an object within it.
 
 import numpy as np
 
-from ...numerics import grid as lattice
 from ...numerics.sampling import frame
+from ...techniques.lattice.focus import box_around
 from ...transport.context import LightContext
 from ...transport.parallel import CHUNK, chunks, parallel_for
-from ...transport.vectors import dot
+from ...transport.vectors import dot, faced
 
 # Texels along a side of a virtual light's hemisphere, and of a distant light's view.
 SIDE, DISTANT_SIDE = 16, 48
@@ -21,6 +21,9 @@ SIDE, DISTANT_SIDE = 16, 48
 TOLERANCE, DISTANT_TOLERANCE = 0.02, 0.25
 # A distant light's view covers this many times the box around all volumes, cut to the scene.
 FOCUS = 2.0
+# Parallel rays begin this much further away than all there is.
+_OUTSIDE = 1.001
+# A plane that every point is in front of.
 _FREE = np.float32([0.0, 0.0, 0.0, -1e30])
 
 
@@ -48,13 +51,9 @@ def light_planes(context: LightContext, positions: np.ndarray, normals: np.ndarr
 
 def focus(context: LightContext) -> tuple[np.ndarray, float]:
     """Centre (3,) float64 and radius [m] of what distant lights' views cover."""
-    cube = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
-    corners = np.concatenate([lattice.transform_points(volume.world_from_local, cube) for volume in context.scene.volumes])
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    grown = 0.5 * (low + high) + 0.5 * FOCUS * np.array([low - high, high - low])
     bounds = np.array(context.geometry.bounds(), np.float64)
-    box = np.array([np.maximum(grown[0], bounds[0]), np.minimum(grown[1], bounds[1])])
-    if np.any(box[0] > box[1]):
+    box = box_around(context.scene.volumes, FOCUS, bounds)
+    if box is None:
         box = bounds
     return box.mean(axis=0), max(0.5 * float(np.linalg.norm(box[1] - box[0])), 1e-6)
 
@@ -63,9 +62,9 @@ def distant_planes(context: LightContext, directions: np.ndarray, side: int = DI
     """(m, side², 4) float32: the planes that parallel rays from ``directions`` (m, 3) meet first, in the square about ``focus``."""
     centre, radius = focus(context)
     centres = (2.0 * np.arange(side) + 1.0) / side - 1.0
-    v, u = (part.ravel()[:, None] * radius for part in np.meshgrid(centres, centres, indexing="ij"))
+    v, u = (offsets.ravel()[:, None] * radius for offsets in np.meshgrid(centres, centres, indexing="ij"))
     bounds = np.array(context.geometry.bounds(), np.float64)
-    away = 1.001 * (float(np.linalg.norm(np.abs(bounds - centre).max(axis=0))) + radius)
+    away = _OUTSIDE * (float(np.linalg.norm(np.abs(bounds - centre).max(axis=0))) + radius)
     directions = np.asarray(directions, np.float64)
     tangent, bitangent = frame(directions)
 
@@ -112,8 +111,7 @@ def _planes(context: LightContext, rays, count: int, per_light: int) -> np.ndarr
         planes = np.tile(_FREE, (len(origins), 1))
         rows = np.flatnonzero(hits.primitive >= 0)
         primitive = hits.primitive[rows]
-        normals = context.geometry.normals_world[primitive]
-        normals = normals * -np.copysign(np.float32(1.0), dot(normals, directions[rows]))[:, None]
+        normals = faced(context.geometry.normals_world[primitive], directions[rows])
         planes[rows, :3] = normals
         planes[rows, 3] = dot(normals, context.geometry.points(primitive, hits.u[rows], hits.v[rows]))
         result[spans[i]] = planes.reshape(-1, per_light, 4)

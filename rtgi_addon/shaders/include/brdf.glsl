@@ -1,51 +1,95 @@
 // How a surface of the G-buffer reflects: Lambert under a GGX layer, as Cycles' Principled BSDF with multiple scattering does.
-// Energy that the layer reflects is what lies below it does not get (preview/ggx.py); both together reflect the material's albedo.
+// Energy that the layer reflects is what lies below it does not get (transport/surfaces/ggx.py); both together reflect the material's albedo.
 
 const float INVERSE_PI = 0.31830988618;
 const float MIN_ALPHA = 2e-3;
 
+// Indices of refraction in the table (transport/surfaces/ggx.py).
+const int INDICES = 12;
+const float MOST_ROOT = 0.99;
+
 struct SurfaceLook {
   vec3 diffuse;
-  // Reflectance at normal incidence and at grazing angles.
+  // What the layer reflects as metal at normal incidence, and how much more at grazing angles.
   vec3 f0;
-  vec3 f90;
+  vec3 edge;
+  // Share of light from everywhere alike that it reflects to the eye in all.
+  vec3 layer;
+  // How much of the layer is a dielectric, and its index. All of these with what scattering more than once adds.
+  float coat;
+  float index;
   float alpha;
-  // What scattering more than once adds to the layer.
-  vec3 gain;
 };
 
-// The two terms of the layer's energy and their means, bilinear between texel centres.
-vec4 layer_energy(float cosine, float roughness)
+float dielectric_fresnel(float cosine, float index)
 {
-  ivec2 last = textureSize(ggx_energy, 0) - 1;
-  vec2 place = clamp(vec2(cosine, roughness) * vec2(last + 1) - 0.5, vec2(0.0), vec2(last));
-  ivec2 low = min(ivec2(place), last - 1);
+  float g = sqrt(max(index * index - 1.0 + cosine * cosine, 0.0));
+  float across = (g - cosine) / max(g + cosine, 1e-6);
+  float along = (cosine * (g + cosine) - 1.0) / (cosine * (g - cosine) + 1.0);
+  return 0.5 * across * across * (1.0 + along * along);
+}
+
+// Share that microfacets reflect at `cosine` to their normals.
+vec3 fresnel(SurfaceLook look, float cosine)
+{
+  float c = clamp(cosine, 0.0, 1.0);
+  return look.f0 + look.edge * pow(1.0 - c, 5.0) + look.coat * dielectric_fresnel(c, look.index);
+}
+
+// A block of the table, bilinear between texel centres: of 0 the two terms of the layer's energy and their means.
+vec4 layer_energy(float cosine, float roughness, int block)
+{
+  int last = textureSize(ggx_energy, 0).x - 1;
+  // The last half texel, where roughness is 1 and eyes look straight on, goes on as the one before.
+  vec2 place = clamp(vec2(cosine, roughness) * float(last + 1) - 0.5, vec2(0.0), vec2(last) + 0.5);
+  ivec2 low = min(ivec2(place), ivec2(last - 1));
   vec2 f = place - vec2(low);
+  low.y += block * (last + 1);
   vec4 bottom = mix(texelFetch(ggx_energy, low, 0), texelFetch(ggx_energy, low + ivec2(1, 0), 0), f.x);
   vec4 top = mix(texelFetch(ggx_energy, low + ivec2(0, 1), 0), texelFetch(ggx_energy, low + ivec2(1, 1), 0), f.x);
   return mix(bottom, top, f.y);
 }
 
-vec3 multiple_scattering(vec3 f0, vec3 f90, float energy)
+// What a dielectric layer reflects once of light from everywhere alike, at `cosine` and in the mean.
+vec2 dielectric_energy(float f0, float cosine, float roughness, vec4 energy)
 {
-  vec3 mean_fresnel = f0 + (f90 - f0) / 21.0;
-  return 1.0 + mean_fresnel * (1.0 - energy) / max(energy, 1e-3);
+  float place = sqrt(sqrt(clamp(f0, 0.0, 1.0))) * float(INDICES - 1);
+  int low = min(int(place), INDICES - 2);
+  vec4 way = layer_energy(cosine, roughness, 1 + low);
+  return f0 * (energy.xz + energy.yw) + (1.0 - f0) * mix(way.xz, way.yw, place - float(low));
+}
+
+vec3 multiple_scattering(vec3 mean_fresnel, float energy, float mean_energy)
+{
+  vec3 again = mean_fresnel * mean_energy / max(1.0 - mean_fresnel * (1.0 - mean_energy), vec3(1e-3));
+  return 1.0 + again * (1.0 - energy) / max(energy, 1e-3);
 }
 
 SurfaceLook surface_look(vec3 albedo, vec3 base_color, float metallic, float roughness, float specular, float view_cosine)
 {
   SurfaceLook look;
-  look.f0 = mix(vec3(specular), base_color, metallic);
-  // A layer that reflects almost nothing head on reflects little at grazing angles, too.
-  look.f90 = clamp(100.0 * look.f0, 0.0, 1.0);
   look.alpha = max(roughness * roughness, MIN_ALPHA);
-  vec4 energy = layer_energy(view_cosine, roughness);
-  look.gain = multiple_scattering(look.f0, look.f90, energy.x + energy.y);
-  vec3 reflected = (look.f0 * energy.x + look.f90 * energy.y) * look.gain;
-  vec3 mean = (look.f0 * energy.z + look.f90 * energy.w) * multiple_scattering(look.f0, look.f90, energy.z + energy.w);
-  float below = 1.0 - max(reflected.r, max(reflected.g, reflected.b));
-  float below_mean = 1.0 - max(mean.r, max(mean.g, mean.b));
-  look.diffuse = max(albedo - mean, vec3(0.0)) * max(below, 0.0) / max(below_mean, 0.05);
+  vec4 energy = layer_energy(view_cosine, roughness, 0);
+  float once = energy.x + energy.y;
+  float mean_once = energy.z + energy.w;
+  // A metal that reflects almost nothing head on reflects little at grazing angles, too.
+  vec3 rise = clamp(100.0 * base_color, 0.0, 1.0) - base_color;
+  vec3 more = multiple_scattering(base_color + rise / 21.0, once, mean_once);
+  vec3 more_mean = multiple_scattering(base_color + rise / 21.0, mean_once, mean_once);
+  float root = sqrt(clamp(specular, 0.0, pow(MOST_ROOT, 4.0)));
+  look.index = (1.0 + root) / (1.0 - root);
+  // The mean of the Fresnel equations over a uniform sky (Kulla and Conty 2017).
+  vec3 fresnel_mean = vec3((look.index - 1.0) / (4.08567 + 1.00071 * look.index));
+  float more_coat = multiple_scattering(fresnel_mean, once, mean_once).x;
+  vec2 dielectric = dielectric_energy(specular, view_cosine, roughness, energy);
+  float below = max(1.0 - dielectric.x * more_coat, 0.0);
+  float mean_coat = dielectric.y * multiple_scattering(fresnel_mean, mean_once, mean_once).x;
+  vec3 mean = metallic * (base_color * mean_once + rise * energy.w) * more_mean + (1.0 - metallic) * mean_coat;
+  look.diffuse = max(albedo - mean, vec3(0.0)) * below / max(1.0 - mean_coat, 0.05);
+  look.f0 = metallic * base_color * more;
+  look.edge = metallic * rise * more;
+  look.coat = (1.0 - metallic) * more_coat;
+  look.layer = look.f0 * once + look.edge * energy.y + look.coat * dielectric.x;
   return look;
 }
 
@@ -62,6 +106,5 @@ vec3 reflectance(SurfaceLook look, vec3 normal, vec3 towards_eye, vec3 towards_l
   float t = nh * nh * (a2 - 1.0) + 1.0;
   float distribution = a2 * INVERSE_PI / (t * t);
   float masking = 0.5 / (nl * sqrt(nv * nv * (1.0 - a2) + a2) + nv * sqrt(nl * nl * (1.0 - a2) + a2));
-  float grazing = pow(clamp(1.0 - dot(towards_eye, half_vector), 0.0, 1.0), 5.0);
-  return result + mix(look.f0, look.f90, grazing) * look.gain * (distribution * masking);
+  return result + fresnel(look, dot(towards_eye, half_vector)) * (distribution * masking);
 }

@@ -32,3 +32,9 @@ vec2 encoded_primitive(int index)
 {
   return vec2(float((index + 1) >> 16), float((index + 1) & 65535));
 }
+
+// The same with the material's index above it, 8 bits in each (transport/views/gbuffer.py).
+vec2 encoded_surface(int index, int material_index)
+{
+  return encoded_primitive(index) + 65536.0 * vec2(float(material_index >> 8), float(material_index & 255));
+}

@@ -16,7 +16,7 @@ vec3 lpv_cascades_irradiance(vec3 position_world, vec3 normal_world, int first, 
     left *= 1.0 - covered;
     if (share > 0.0) {
       LpvVolume volume = LpvVolume(shape.xyz, shape.w, ivec2(0, int(indirect.factors[level].z)), indirect.factors[level].x,
-                                   indirect.factors[level].y, indirect.surface_cells, indirect.behind, dampening);
+                                   indirect.factors[level].y, indirect.surface_cells, dampening);
       sum += share * lpv_irradiance(volume, cells, normal_world);
     }
   }

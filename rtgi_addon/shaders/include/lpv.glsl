@@ -1,6 +1,6 @@
 // Irradiance from an accumulated light propagation volume (techniques/lpv/gather.py, which derives it). Positions are in cells from
 // the volume's corner: cell i reaches from i to i + 1.
-#include "include/volume.glsl"
+#include "include/standing.glsl"
 
 // Where a volume's light stands in textures of a colour channel each, and what takes coefficients 0 and 1 to 3 to irradiance.
 struct LpvVolume {
@@ -9,9 +9,8 @@ struct LpvVolume {
   ivec2 first_texel;
   float total;
   float along;
-  // How far in front of a surface its light is taken, and when a cell lies behind a plane, in cells.
+  // How far in front of a surface its light is taken, in cells.
   float surface_cells;
-  float behind;
   bool dampening;
 };
 
@@ -21,26 +20,29 @@ struct LpvCell {
   vec4 blue;
 };
 
-// Trilinear between cells' centres, without those that lie behind the plane through `base` with `normal`.
+// Trilinear between cells' centres, of those before the plane through `base` with `normal`, as far as no walls stand before them.
 LpvCell lpv_sample(LpvVolume volume, vec3 cells, vec3 base, vec3 normal)
 {
   ivec3 last = volume.resolution - 1;
   vec3 position = clamp(cells - 0.5, vec3(0.0), vec3(last));
   ivec3 low = min(ivec3(floor(position)), max(last - 1, ivec3(0)));
-  vec3 f = position - vec3(low);
+  vec3 fraction = position - vec3(low);
+  Walls around = Walls(volume.resolution, volume.columns, volume.first_texel);
+  ivec3 standing = standing_cell(walls, around, low, fraction, base, normal);
   float total = 0.0;
   LpvCell result;
   result.red = vec4(0.0);
   result.green = vec4(0.0);
   result.blue = vec4(0.0);
   for (int corner = 0; corner < 8; corner++) {
-    ivec3 step = ivec3(corner & 1, corner >> 1 & 1, corner >> 2);
-    ivec3 cell = min(low + step, last);
-    if (dot(vec3(cell) + 0.5 - base, normal) <= -volume.behind) {
+    ivec3 cell = min(low + eighth(corner), last);
+    if (height_of(cell, base, normal) <= BEFORE_CELLS) {
       continue;
     }
-    vec3 along = mix(1.0 - f, f, vec3(step));
-    float weight = along.x * along.y * along.z;
+    float weight = trilinear_weight(eighth(corner), fraction) * open_way(walls, around, standing, cell);
+    if (cell == standing) {
+      weight += LEAST_SHARE;
+    }
     ivec2 texel = volume.first_texel + atlas_texel(cell, volume.resolution, volume.columns);
     total += weight;
     result.red += weight * texelFetch(light_red, texel, 0);

@@ -1,11 +1,13 @@
 // A virtual light becomes a cosine lobe of intensity in the cell in front of its surface (techniques/lpv/injection.py): one point,
 // blended additively into the texel of that cell.
-#include "include/volume.glsl"
+#include "include/standing.glsl"
 
 void inject_light(vec3 cells, vec3 light_normal, vec3 power)
 {
   ivec3 resolution = parameters.resolution;
-  ivec3 cell = ivec3(floor(cells + 0.5 * light_normal));
+  vec3 place = cells + parameters.distance * light_normal - 0.5;
+  ivec3 low = ivec3(floor(place));
+  ivec3 cell = standing_cell(level_walls, Walls(resolution, parameters.columns, ivec2(0)), low, place - vec3(low), cells, light_normal);
   lobe = vec4(parameters.per_flux, parameters.per_vector * light_normal.yzx);
   light_flux = power;
   vec2 texel = vec2(atlas_texel(cell, resolution, parameters.columns)) + 0.5;

@@ -54,7 +54,7 @@ float coverage_coin(ivec2 texel, int primitive)
   return float(state >> 8) * exp2(-24.0);
 }
 
-// Whether the fragment lets light through (transport/rays.py, AlphaTracer).
+// Whether the fragment lets light through (transport/rays/alpha.py, AlphaTracer).
 bool is_transparent(sampler2D image, int primitive)
 {
   float alpha = clamp(material_input(INPUT_ALPHA, image).r, 0.0, 1.0);

@@ -2,6 +2,9 @@
 // blocks side by side: (position, normal x), (normal y z, flux/pi red green), (blue, area/pi, density by flux, 0); `cumulative` holds
 // the running sums of the quantized flux.
 #include "include/list.glsl"
+#ifdef IN_MEDIA
+#include "include/media.glsl"
+#endif
 
 const float PI = 3.14159265;
 
@@ -117,7 +120,13 @@ vec3 contribution(RsmMap map, Sample chosen, vec2 centre, vec3 position, vec3 no
   vec3 direction = towards / sqrt(max(squared_distance, 1.1754944e-38));
   float leaving = max(-dot(vec3(a.w, b.xy), direction), 0.0);
   float arriving = max(dot(normal, direction), 0.0);
-  return vec3(b.zw, c.x) * (weight * arriving * leaving / max(squared_distance + c.y, 1e-20));
+  vec3 irradiance = vec3(b.zw, c.x) * (weight * arriving * leaving / max(squared_distance + c.y, 1e-20));
+#ifdef IN_MEDIA
+  if (irradiance != vec3(0.0)) {
+    irradiance *= media_transmittance(indirect.media, position, direction, sqrt(squared_distance));
+  }
+#endif
+  return irradiance;
 }
 
 // The sum over the map's part of the pattern, turned by `shift`, for a receiver that projects to `centre` of the unit square.

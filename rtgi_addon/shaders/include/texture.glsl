@@ -1,4 +1,4 @@
-// An image as Cycles filters it, texel by texel: transport/textures.py is the same in numpy. Bilinear weights are full floats, where a
+// An image as Cycles filters it, texel by texel: transport/surfaces/textures.py is the same in numpy. Bilinear weights are full floats, where a
 // GPU's own filter has eight bits.
 
 #define EXTENSION_REPEAT 0

@@ -1,5 +1,5 @@
 // The world's radiance by direction: bilinear in an equirectangular map, columns wrap and rows end at the poles
-// (transport/environment.py, _Equirect).
+// (transport/lights/environment.py, _Equirect).
 
 vec3 world_radiance(sampler2D map, mat3 map_from_world, vec3 direction)
 {

@@ -3,16 +3,18 @@
 import numpy as np
 
 from ...errors import BakeError, UsageError
-from ...numerics.grid import transform_points
+from ...numerics.grid import box_corners, transform_points
 from ...scene import Scene
+from ..base import MAX_TEXTURE_SIDE
 from .grid import LpvGrid
-from .settings import MAX_TEXTURE_SIDE, LpvSettings
+from .settings import LpvSettings
 
 # How far beyond the probe volumes a fitted cascade may reach for the room's walls, as a share of the volumes' size.
 REACH = 0.5
 # Cells over which a cascade gives way to the next one, in from its border.
 BLEND_CELLS = 2.0
-_CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float64)
+# Names of objects that an error lists.
+_SHOWN_NAMES = 20
 
 
 def place_cascades(scene: Scene, settings: LpvSettings, bounds: np.ndarray) -> tuple[LpvGrid, ...]:
@@ -23,6 +25,7 @@ def place_cascades(scene: Scene, settings: LpvSettings, bounds: np.ndarray) -> t
     is not there, UsageError for an unknown object.
     """
     count = settings.resolution
+    # A volume is a sheet of its slices there.
     columns = -(-count * count // MAX_TEXTURE_SIDE)
     if columns * count > MAX_TEXTURE_SIDE:
         raise BakeError(f"a light propagation volume of {count} cells a side is larger than a texture of {MAX_TEXTURE_SIDE} pixels",
@@ -43,7 +46,7 @@ def _snapped(center: np.ndarray, cell: float, count: int) -> LpvGrid:
 
 def _fitted(scene: Scene, bounds: np.ndarray) -> np.ndarray:
     """Box (2, 3) of all probe volumes and what geometry there is around them, up to REACH of their size."""
-    corners = np.concatenate([transform_points(volume.world_from_local, _CORNERS) for volume in scene.volumes])
+    corners = np.concatenate([box_corners(volume.world_from_local) for volume in scene.volumes])
     low, high = corners.min(axis=0), corners.max(axis=0)
     margin = REACH * float((high - low).max())
     return np.stack([np.minimum(low, np.maximum(bounds[0], low - margin)), np.maximum(high, np.minimum(bounds[1], high + margin))])
@@ -62,7 +65,7 @@ def _center(scene: Scene, name: str, box: np.ndarray) -> np.ndarray:
             vertices = scene.meshes[instance.mesh].vertices_local
             world = transform_points(instance.world_from_local, vertices)
             return 0.5 * (world.min(axis=0) + world.max(axis=0))
-    known = ", ".join(sorted({instance.name for instance in scene.instances})[:20])
+    known = ", ".join(sorted({instance.name for instance in scene.instances})[:_SHOWN_NAMES])
     raise UsageError(f"center is {name!r}", f"choose volumes, camera or an object that renders: {known}")
 
 

@@ -4,22 +4,20 @@ from dataclasses import dataclass
 
 from ..base import setting
 
-# The largest side of a texture that the GPUs we write for all accept: a volume is a sheet of its slices there.
-MAX_TEXTURE_SIDE = 16384
-
 
 @dataclass(frozen=True)
 class LpvSettings:
     """Settings of light propagation volumes; the metadata builds panel and command line."""
 
     order: int = setting(1, "SH Order", "Highest band of the exported probes; the volumes themselves hold order 1", "", 0, 2)
-    resolution: int = setting(16, "Resolution", "Cells along each side of every cascade; light spreads with every cell it "
-                              "passes, so finer ones are not always more exact", "", 4, 4096)
+    resolution: int = setting(16, "Resolution", "Cells along each side of every cascade; finer ones show smaller things and "
+                              "take more steps", "", 4, 4096)
     cascades: int = setting(1, "Cascades", "Nested volumes of the same resolution, each with cells twice as large", "", 1, 8)
     cell_size: float | None = setting(None, "Cell Size", "Side of the finest cascade's cells; unset fits that cascade around the "
                                       "probe volumes and the room they stand in", "m", 1e-6, 1e6)
-    center: str = setting("volumes", "Center", "What the cascades are centred on: 'volumes', 'camera' or the name of an object")
-    steps: int = setting(256, "Steps", "How often light moves on by one cell; games use 8, a room needs many times its cells",
+    center: str = setting("volumes", "Center", "What the cascades are centred on: 'volumes', 'camera' or the name of an object",
+                          or_object=("volumes", "camera"))
+    steps: int = setting(256, "Steps", "How often light moves on by one cell; games use 8, a room needs ten times its cells",
                          "", 1, 4096)
     further_bounces: bool = setting(True, "Further Bounces", "Reflect light that meets geometry while it is propagated")
     blocking: bool = setting(True, "Blocking", "Let geometry stop light between cells")
@@ -27,5 +25,10 @@ class LpvSettings:
                              "cameras see of it", choices=("surfaces", "views"))
     map_resolution: int = setting(128, "Shadow Map Size", "Texels along a side of each lamp's reflective shadow maps", "px",
                                   16, 4096)
-    dampening: bool = setting(True, "Self-light Damping", "Use the intensity's derivative along the normal to keep surfaces from "
+    dampening: bool = setting(False, "Self-light Damping", "Use the intensity's derivative along the normal to keep surfaces from "
                               "lighting themselves")
+
+    @property
+    def live(self) -> bool:
+        """Whether the preview makes this light of what it draws, without a bake."""
+        return True

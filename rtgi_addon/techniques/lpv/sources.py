@@ -10,15 +10,21 @@ from ...numerics.grid import lattice_points
 from ...numerics.sampling import fibonacci_sphere, r2, sobol_owen
 from ...progress import Progress
 from ...scene import Scene
+from ...scene.memory import require_memory
 from ...transport.context import LightContext
+from ...transport.lights.shadow_view import ShadowView
 from ...transport.parallel import CHUNK, chunks, parallel_for
-from ...transport.reflective_shadow_map import ReflectiveShadowMap
-from ...transport.shadow_views import ShadowView, lit_views
-from .gather import FACE_TOTAL, intensity_of_radiance
-from .grid import FRONT_SOLID_ANGLE, SIDE_SOLID_ANGLE, LpvGrid
+from ...transport.views.reflective_shadow_map import ReflectiveShadowMap
+from ...transport.views.shadow_views import lit_views
+from ..lattice.resample import thread_bytes
+from .gather import intensity_of_radiance
+from .grid import LpvGrid, lattice_across
 
 # Texels of all shadow maps together: with very many lamps each gets smaller ones.
 MAX_TEXELS, MIN_RESOLUTION = 1 << 21, 16
+# A texel of a map with the light that it becomes, and a cell of a cascade, at the peak; measured with up to two million texels and
+# a quarter of a million cells.
+BYTES_PER_TEXEL, BYTES_PER_CELL = 165, 390
 # Points on emissive surfaces, and rays from each cell to the world and to its bright patches.
 EMITTER_POINTS, WORLD_RAYS, BRIGHT_RAYS = 1 << 15, 96, 32
 
@@ -55,16 +61,19 @@ def capture_maps(context: LightContext, kernels, grids: tuple[LpvGrid, ...], res
     shines.
     """
     outermost, bounds = grids[-1], np.array(context.geometry.bounds(), np.float64)
-    maps = []
-    for lamp, views in enumerate(map_views(context.scene, bounds, grids, resolution)):
+    maps, views_of = [], map_views(context.scene, bounds, grids, resolution)
+    texels = sum(view.resolution**2 for views in views_of for view in views)
+    require_memory({"shadow maps": texels * BYTES_PER_TEXEL, "cells": sum(grid.count for grid in grids) * BYTES_PER_CELL,
+                    "threads": thread_bytes(context)})
+    for lamp, views in enumerate(views_of):
         progress.step(lamp / context.lamps.count, "capturing reflective shadow maps")
-        own = [kernels.capture(context, view) for view in views]
-        lit = [captured.lights() for captured in own]
+        of_lamp = [kernels.capture(context, view) for view in views]
+        lit = [captured.lights() for captured in of_lamp]
         if any(len(texels.flux) for texels in lit) and not any(outermost.inside(texels.positions).any() for texels in lit):
             name = context.scene.lights[lamp].name
             raise BakeError(f"lamp {name!r} lights nothing inside the light propagation volumes",
                             "add cascades, raise cell_size, or hide the lamp from renders")
-        maps += own
+        maps += of_lamp
     dark = context.environment.is_black and not context.emitters.count
     if maps and dark and not any(np.any(captured.primitive >= 0) for captured in maps):
         raise BakeError("no lamp lights any surface", "turn a lamp towards the scene, or add light")
@@ -80,9 +89,10 @@ def emissive_lights(context: LightContext, seed: int, count: int = EMITTER_POINT
     """Emissive surfaces as points by power, each sending to both sides."""
     if not context.emitters.count:
         return joined([])
-    positions, normals, radiance, pdf, _ = context.emitters.sample(sobol_owen(count, 3, seed))
-    flux = (radiance * (np.pi / (count * np.maximum(pdf, 1e-30)))[:, None]).astype(np.float32)
-    return Lights(np.concatenate([positions, positions]), np.concatenate([normals, -normals]), np.concatenate([flux, flux]))
+    emitted = context.emitters.sample(sobol_owen(count, 3, seed))
+    scale = (np.pi / (count * np.maximum(emitted.pdf_area, 1e-30)))[:, None]
+    flux = [(context.emitters.mean_radiance(emitted, side) * scale).astype(np.float32) for side in (1, -1)]
+    return Lights(np.tile(emitted.points, (2, 1)), np.concatenate([emitted.normals, -emitted.normals]), np.concatenate(flux))
 
 
 def world_volume(context: LightContext, grid: LpvGrid, seed: int, progress: Progress) -> np.ndarray:
@@ -106,8 +116,11 @@ def world_volume(context: LightContext, grid: LpvGrid, seed: int, progress: Prog
 
     def work(i):
         origins = np.repeat(centers[spans[i]], len(directions), axis=0)
-        free = ~context.tracer.occluded(origins, np.tile(directions, (len(centers[spans[i]]), 1)))
-        return np.einsum("nd,dk->nk", free.reshape(-1, len(directions)).astype(np.float32), projected)
+        passed = context.tracer.transmittance(origins, np.tile(directions, (len(centers[spans[i]]), 1))).astype(np.float32)
+        if passed.shape[1] == 1:
+            return np.einsum("nd,dk->nk", passed.reshape(-1, len(directions)), projected)
+        colours = projected.reshape(len(directions), -1, 3)
+        return np.einsum("ndc,dkc->nkc", passed.reshape(-1, len(directions), 3), colours).reshape(-1, projected.shape[1])
 
     parts = parallel_for(work, len(spans), context.threads, progress, "light of the world")
     return np.ascontiguousarray(np.concatenate(parts).T).reshape(volume.shape)
@@ -118,31 +131,19 @@ def border(grid: LpvGrid) -> tuple[np.ndarray, np.ndarray]:
     positions, normals = [], []
     corner, cell = np.asarray(grid.corner), grid.cell
     for axis in range(3):
-        others = [(axis + 1) % 3, (axis + 2) % 3]
-        u, v = np.meshgrid(*(corner[other] + (np.arange(grid.resolution[other]) + 0.5) * cell for other in others), indexing="ij")
+        centres = lattice_across(axis, corner, cell, grid.resolution)
         for end, inward in ((corner[axis], 1.0), (grid.high[axis], -1.0)):
-            face = np.empty((u.size, 3))
-            face[:, axis], face[:, others[0]], face[:, others[1]] = end, u.ravel(), v.ravel()
+            face = centres.copy()
+            face[:, axis] = end
             positions.append(face)
-            normals.append(np.tile(np.eye(3)[axis] * inward, (u.size, 1)))
+            normals.append(np.tile(np.eye(3)[axis] * inward, (len(face), 1)))
     return np.concatenate(positions).astype(np.float32), np.concatenate(normals).astype(np.float32)
 
 
 def entering(grid: LpvGrid, positions: np.ndarray, inward: np.ndarray, flux: np.ndarray) -> Lights:
-    """Lights for what crosses the border's faces at ``positions`` (f, 3) along ``inward`` (f, 3) with ``flux`` (f, 3) [W].
-
-    Light that comes in evenly goes on to the five other faces of its cell by their solid angles; sent straight ahead it would
-    get much farther in than propagated light does.
-    """
-    tangent = np.roll(inward, 1, axis=1)
-    bitangent = np.roll(inward, 2, axis=1)
-    centers = positions + np.float32(0.5 * grid.cell) * inward
-    onward = [(inward, FRONT_SOLID_ANGLE), *((side, SIDE_SOLID_ANGLE) for side in (tangent, -tangent, bitangent, -bitangent))]
-    parts = []
-    for normals, solid_angle in onward:
-        # Injection moves a light by half a cell along its normal: back to the centre.
-        parts.append(Lights(centers - np.float32(0.5 * grid.cell) * normals, normals, flux * np.float32(solid_angle / FACE_TOTAL)))
-    return joined(parts)
+    """Lights for what crosses the border's faces at ``positions`` (f, 3) along ``inward`` (f, 3) with ``flux`` (f, 3) [W]: what
+    comes in evenly is a lobe from the face into its cell."""
+    return Lights(positions, inward, flux)
 
 
 def joined(parts: list[Lights]) -> Lights:

@@ -1,46 +1,56 @@
 """Surface elements for the geometry volume: from every surface in it, or from what lamps and cameras see."""
 
+from dataclasses import fields
+
 import numpy as np
 
 from ...transport.context import LightContext
-from ...transport.reflective_shadow_map import ReflectiveShadowMap
-from ...transport.shadow_views import ShadowView
-from ...transport.vectors import dot
+from ...transport.lights.shadow_view import ShadowView
+from ...transport.rays.tracer import SELF_INTERSECTION
+from ...transport.vectors import dot, faced
+from ...transport.views.reflective_shadow_map import ReflectiveShadowMap
 from .geometry_volume import Surfels
-from .grid import LpvGrid
+from .grid import LpvGrid, lattice_across
 
 # Rays through a cell along each axis and side, and how many surfaces one behind the other they find.
 RAYS_PER_CELL, MAX_LAYERS = 4, 128
+# A ray goes on behind a surface by this share of a cell, and by what its coordinates may be rounded by.
+ADVANCE, ROUNDING = 1e-4, np.float32(2.0) * SELF_INTERSECTION
+# The axis that a normal is closest to has a cosine of 1/√3 with it, or more: less comes from rounding alone.
+LEAST_COSINE = np.float32(0.5)
 # A texel that sees a surface at grazing incidence stands for at most this many times its own cross-section.
 MAX_STRETCH = 20.0
-CAMERA_RESOLUTION = 256
-CAMERA_NEAR_SHARE = 1e-5
+# Texels along a side of what a camera sees, and how near that begins, as a share of how far it reaches.
+CAMERA_RESOLUTION, CAMERA_NEAR_SHARE = 256, 1e-5
 
 
 def peel(context: LightContext, grid: LpvGrid) -> Surfels:
     """Every surface in ``grid`` by rays along the three axes, one layer after another; a surface counts along the axis that its
     normal is closest to, so that it is met no more obliquely than under 55 degrees."""
-    parts = [_peel_axis(context, grid, axis) for axis in range(3)]
-    return Surfels(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+    return joined([_peel_axis(context, grid, axis) for axis in range(3)])
 
 
-def _peel_axis(context, grid, axis):
-    others = [(axis + 1) % 3, (axis + 2) % 3]
+def joined(parts: list[Surfels]) -> Surfels:
+    """All surfels of ``parts`` in order; no parts give no surfels."""
+    none = Surfels(*(np.zeros(shape, np.float32) for shape in ((0, 3), (0, 3), 0, (0, 3))))
+    return Surfels(*(np.concatenate([getattr(part, item.name) for part in (none, *parts)]) for item in fields(Surfels)))
+
+
+def _peel_axis(context, grid, axis) -> Surfels:
     low, high = np.asarray(grid.corner) - 0.5 * grid.cell, grid.high + 0.5 * grid.cell
     spacing = grid.cell / RAYS_PER_CELL
     count = (np.asarray(grid.resolution) + 1) * RAYS_PER_CELL
-    u, v = np.meshgrid(*(low[other] + (np.arange(count[other]) + 0.5) * spacing for other in others), indexing="ij")
-    origins = np.empty((u.size, 3), np.float32)
-    origins[:, axis], origins[:, others[0]], origins[:, others[1]] = low[axis], u.ravel(), v.ravel()
+    origins = lattice_across(axis, low, spacing, count).astype(np.float32)
+    origins[:, axis] = low[axis]
     direction = np.zeros((1, 3), np.float32)
     direction[0, axis] = 1.0
     length = np.float32(high[axis] - low[axis])
-    advance = np.float32(1e-4 * grid.cell) + np.float32(8e-6) * np.float32(max(np.abs(low).max(), np.abs(high).max()))
+    advance = np.float32(ADVANCE * grid.cell) + ROUNDING * np.float32(max(np.abs(low).max(), np.abs(high).max()))
     travelled = np.zeros(len(origins), np.float32)
-    found = []
+    layers = []
     for _ in range(MAX_LAYERS):
         start = origins + direction * travelled[:, None]
-        hits = context.tracer.intersect(start, np.repeat(direction, len(start), axis=0), length - travelled)
+        hits = context.tracers.diffuse.intersect(start, np.repeat(direction, len(start), axis=0), length - travelled)
         rows = np.flatnonzero(hits.primitive >= 0)
         if not rows.size:
             break
@@ -48,12 +58,10 @@ def _peel_axis(context, grid, axis):
         normals = context.geometry.normals_world[primitive]
         chosen = np.flatnonzero(np.argmax(np.abs(normals), axis=1) == axis)
         primitive, u, v, normals = primitive[chosen], u[chosen], v[chosen], normals[chosen]
-        area = np.float32(spacing**2) / np.maximum(np.abs(normals[:, axis]), np.float32(0.5))
-        found.append((context.geometry.points(primitive, u, v), normals, area, context.surfaces.albedo(primitive, u, v)))
+        area = np.float32(spacing**2) / np.maximum(np.abs(normals[:, axis]), LEAST_COSINE)
+        layers.append(Surfels(context.geometry.points(primitive, u, v), normals, area, _mean_albedo(context, primitive, u, v)))
         origins, travelled = origins[rows], travelled[rows] + hits.t[rows] + advance
-    if not found:
-        return np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32), np.zeros(0, np.float32), np.zeros((0, 3), np.float32)
-    return tuple(np.concatenate(columns) for columns in zip(*found, strict=True))
+    return joined(layers)
 
 
 def of_map(context: LightContext, captured: ReflectiveShadowMap) -> Surfels:
@@ -72,7 +80,7 @@ def of_camera(context: LightContext, camera, resolution: int = CAMERA_RESOLUTION
                       resolution, CAMERA_NEAR_SHARE * far, far)
     origins, directions = view.rays()
     directions = directions / np.linalg.norm(directions, axis=1, keepdims=True)
-    hits = context.tracer.intersect(origins, np.ascontiguousarray(directions, np.float32))
+    hits = context.tracers.diffuse.intersect(origins, np.ascontiguousarray(directions, np.float32))
     rows = np.flatnonzero(hits.primitive >= 0)
     primitive = hits.primitive[rows]
     return _seen(context, view, rows, context.geometry.points(primitive, hits.u[rows], hits.v[rows]), primitive)
@@ -83,14 +91,20 @@ def _seen(context, view: ShadowView, rows, positions, primitive) -> Surfels:
     directions = view.directions()[rows].astype(np.float32)
     normals = context.geometry.normals_world[primitive]
     cosine = dot(normals, directions)
-    normals = normals * -np.copysign(np.float32(1.0), cosine)[:, None]
+    normals = faced(normals, directions)
     measure = view.texel_measure().ravel()[rows]
     if not view.orthographic:
         measure = measure * np.square(positions - view.position_world).sum(axis=1)
     area = (measure / np.maximum(np.abs(cosine), 1.0 / MAX_STRETCH)).astype(np.float32)
     # Barycentrics are not kept in a map: a triangle's albedo is looked up at the point itself.
     u, v = _barycentrics(context.geometry.triangles_world[primitive], positions)
-    return Surfels(positions, normals, area, context.surfaces.albedo(primitive, u, v))
+    return Surfels(positions, normals, area, context.surfaces.albedo_of_side(primitive, u, v, -cosine))
+
+
+def _mean_albedo(context, primitive, u, v) -> np.ndarray:
+    """(n, 3): a cell's block of geometry reflects alike to both sides."""
+    sides = [context.surfaces.albedo_of_side(primitive, u, v, np.full(len(u), side, np.float32)) for side in (1, -1)]
+    return np.mean(sides, axis=0, dtype=np.float32)
 
 
 def _barycentrics(triangles: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,35 +1,54 @@
-"""How many rays each probe needs, from how far two independent parts of its own sequence disagree.
+"""How many rays each probe needs, from how far parts of its own sequence disagree.
 
-An Owen-scrambled Sobol sequence errs like c·N^−slope. The estimates from its first N₁ and its next N₂ points are nearly
-independent, so their mean square difference is c²(N₁^−2s + N₂^−2s): that gives c, and with it the error of all N₁ + N₂ points
-and the number that a smaller error takes. The slope is what rays at sharp patches of light reach (−.66 measured in a sunlit
-atrium); smooth rooms do better (−.77 to −.81, PHYSICS.md §5).
+Sections of an Owen-scrambled Sobol sequence complement each other: the second half of the points falls where the first left gaps,
+so the mean of both is better than the disagreement of two independent halves would say. Nothing needs to be assumed of that. Let
+V(n) be the variance of what n points say, d the difference between the first n₁ points and the n₂ that follow, and w₁, w₂ their
+shares of all N: as Y_N = w₁·Y₁ + w₂·Y₂, whatever the two have in common,
+
+    w₁·w₂·E[d²] = w₁·V(n₁) + w₂·V(n₂) − V(N).
+
+Numbers of rays double from round to round, where every section is a scrambled net of its own and has the variance of its number of
+points (Owen, "Scrambled Net Variance for Integrals of Smooth Functions", Ann. Statist. 25(4), 1997). With V(n) = a·n^−2s each
+doubling gives a, and two or more give s: from ½, that of independent rays, to 3/2, that of smooth functions; about 1 in plain
+rooms; sharp patches of light have 0.65. Between powers of two a sequence errs hardly less than at the one before: the points beyond
+it are those of a smaller net.
 """
 
 import numpy as np
 
+# Rays of every probe before its error is first asked for: the last of the rounds that all have.
 FIRST_ROUND = 256
-SLOPE = 0.65
+# The s of V(n) = a·n^−2s before anything is known of it, how far it is thought to be off, and how much probes of one bake differ;
+# what it is held within.
+SLOPE, SLOPE_SPREAD, SLOPE_DIFFERENCE = 0.75, 0.25, 0.12
+LEAST_SLOPE, MOST_SLOPE = 0.5, 1.5
+# Squared differences of a group of probes are worth so many independent ones: bands and colours of one error, and neighbours under
+# the same directions, have most in common.
+FREEDOM = 4.0
 # One probe's difference is one sample of its error: lean on the mean of its neighbours by this share.
 POOLED = 0.5
 # Weight of what earlier rounds said of a probe's error in what the next one makes of it.
 REMEMBERED = 0.5
 # Share of the target left to the sampling of probe rays; the rest is for the surface cache.
 SAMPLING_SHARE = 0.75
-# A round goes this share of the way that the last estimate asks for, so that an overestimate is noticed before it is paid for.
-STRIDE = 0.7
+# The mean over all probes is held to the target, so that half of those that lie between two powers of two are above it and half
+# below; no group of probes is left with more than this times the variance that goes with it.
+MOST_ABOVE = 2.0
 
 
 class ErrorModel:
     """Keeps the sums of each probe's rays and says what error they have.
 
-    ``total`` (p, k, 3) float64 sums of 4π·L·Y over all ``rays`` (p,) int64.
+    ``total`` (p, k, 3) float64 sums of 4π·L·Y over all ``rays`` (p,) int64. ``brightness`` is the RMS norm of the coefficients of
+    all probes of the bake, where these are but some of them (None: they are all).
     """
 
-    def __init__(self, probes: int, coefficients: int):
+    def __init__(self, probes: int, coefficients: int, brightness: float | None = None):
         self.total = np.zeros((probes, coefficients, 3))
         self.rays = np.zeros(probes, np.int64)
-        self._constant = np.full(probes, np.nan)
+        self._brightness = brightness
+        # w₁·w₂·d² (p,) of each pair of sections (n₁, n₂), NaN where a probe was not asked.
+        self._squares: dict[tuple[int, int], np.ndarray] = {}
 
     def coefficients(self) -> np.ndarray:
         """SH estimate (p, k, 3) from all rays so far; zero where none were traced."""
@@ -38,52 +57,114 @@ class ErrorModel:
     def add(self, probes: np.ndarray, sums: np.ndarray, rays: np.ndarray) -> None:
         """Add the ``sums`` (m, k, 3) of ``rays`` (m,) further rays of ``probes`` (m,), and compare them with those before."""
         before = self.rays[probes]
-        compared = np.flatnonzero(before > 0)
-        if compared.size:
-            rows, n1, n2 = probes[compared], before[compared].astype(float), rays[compared].astype(float)
-            difference = self.total[rows] / n1[:, None, None] - sums[compared] / n2[:, None, None]
-            spread = n1 ** (-2 * SLOPE) + n2 ** (-2 * SLOPE)
-            found = (difference**2).sum(axis=(1, 2)) / spread
-            # One difference may be small by luck, and a probe that stops by it stays wrong: earlier ones keep half the say.
-            known = np.where(np.isnan(self._constant[rows]), found, self._constant[rows] ** 2)
-            self._constant[rows] = np.sqrt((1.0 - REMEMBERED) * found + REMEMBERED * known)
+        for n1, n2 in np.unique(np.stack([before, rays], axis=1)[before > 0], axis=0).tolist():
+            alike = np.flatnonzero((before == n1) & (rays == n2))
+            difference = self.total[probes[alike]] / n1 - sums[alike] / n2
+            column = self._squares.setdefault((n1, n2), np.full(len(self.rays), np.nan))
+            column[probes[alike]] = (difference**2).sum(axis=(1, 2)) * (n1 * n2 / (n1 + n2) ** 2)
         self.total[probes] += sums
         self.rays[probes] += rays
 
     def state(self) -> dict[str, np.ndarray]:
         """Everything it knows, for a checkpoint."""
-        return {"total": self.total, "rays": self.rays, "constant": self._constant}
+        pairs = np.array(list(self._squares), np.int64).reshape(-1, 2)
+        squares = np.array(list(self._squares.values())).reshape(len(pairs), len(self.rays))
+        return {"total": self.total, "rays": self.rays, "pairs": pairs, "squares": squares}
 
     def restore(self, arrays: dict[str, np.ndarray]) -> None:
         """Take up from ``state``."""
-        self.total, self.rays, self._constant = arrays["total"], arrays["rays"], arrays["constant"]
+        self.total, self.rays = arrays["total"], arrays["rays"]
+        pairs = map(tuple, arrays["pairs"].tolist())
+        self._squares = {pair: squares.copy() for pair, squares in zip(pairs, arrays["squares"], strict=True)}
 
     def error(self, probes: np.ndarray, groups: np.ndarray) -> np.ndarray:
-        """Estimated norm (m,) of each probe's error, pooled over the probes of its group (m,) int, relative to their scale."""
-        return self._relative(probes, groups) * self.scale(probes) * self.rays[probes] ** -SLOPE
+        """Estimated norm (m,) of each probe's error, leaning on the probes of its group (m,) int."""
+        scale = self.scale(probes)
+        variance, slope = self._at_one(probes, groups, scale)
+        return np.sqrt(variance * self.rays[probes] ** (-2.0 * slope[groups])) * scale
 
-    def rays_needed(self, probes: np.ndarray, groups: np.ndarray, target: float) -> np.ndarray:
-        """Number of rays (m,) at which each probe's error is expected to fall to ``target`` times its scale."""
-        return (self._relative(probes, groups) / target) ** (1.0 / SLOPE)
+    def rays_needed(self, probes: np.ndarray, groups: np.ndarray, target: float, highest: int) -> np.ndarray:
+        """Number of rays (m,), at least those that they have and at most ``highest``, at which the mean square over lit ``probes``
+        of their errors, each relative to its scale, is expected to fall to that of ``target``; one for all of a group, doubled as
+        often as it takes, the worst first. Groups are runs of ``probes`` that have had the same rays, counted from 0."""
+        if not len(probes):
+            return np.zeros(0, np.int64)
+        scale = self.scale(probes)
+        variance, slope = self._at_one(probes, groups, scale)
+        first = np.flatnonzero(np.diff(groups, prepend=-1))
+        rays, size = self.rays[probes[first]], np.bincount(groups)
+        now = np.bincount(groups, variance) * rays ** (-2.0 * slope) / size
+        # A mean over few groups may be small by luck: it is taken for as much more as one standard error of it.
+        falls, allowed = 2.0 ** (-2.0 * slope), target**2 / (1.0 + np.sqrt(2.0 / (FREEDOM * len(size))))
+        # Probes in the dark, which have no error, do not make room for that of others.
+        sum_allowed = allowed * np.count_nonzero(scale)
+        steps = np.arange(max(1, int(np.ceil(np.log2(max(highest, 1) / max(rays.min(), 1)))) + 1))
+        values = now[:, None] * falls[:, None] ** steps
+        open_steps = rays[:, None] * 2.0**steps < highest
+        saved = np.where(open_steps, values * (1.0 - falls[:, None]) * size[:, None], 0.0).reshape(-1)
+        order = np.argsort(-np.where(open_steps, values, -1.0).reshape(-1), kind="stable")
+        left = float((now * size).sum()) - np.cumsum(np.append(0.0, saved[order]))
+        # Each doubling is needed while what those before it leave is too much.
+        doubled = np.zeros(len(order), bool)
+        doubled[order[left[:-1] > sum_allowed]] = True
+        doubled |= values.reshape(-1) > MOST_ABOVE * allowed
+        times = (doubled & open_steps.reshape(-1)).reshape(values.shape).sum(axis=1)
+        return np.minimum(rays * 2**times, np.maximum(highest, rays))[groups]
 
     def scale(self, probes: np.ndarray) -> np.ndarray:
         """What a relative error is relative to (m,): the probe's own norm, or for dim probes its geometric mean with the RMS of
         all, since a few per cent of a dark corner are less seen than one of a bright wall."""
         norms = np.sqrt((self.coefficients() ** 2).sum(axis=(1, 2)))
-        traced = self.rays > 0
-        rms = np.sqrt((norms[traced] ** 2).mean()) if traced.any() else 0.0
+        rms, traced = self._brightness, self.rays > 0
+        if rms is None:
+            rms = np.sqrt((norms[traced] ** 2).mean()) if traced.any() else 0.0
         return np.sqrt(norms[probes] * np.maximum(norms[probes], rms))
 
-    def _relative(self, probes, groups):
-        scale = self.scale(probes)
-        own = np.where(scale > 0, self._constant[probes] / np.where(scale > 0, scale, 1.0), 0.0)
-        count = np.maximum(np.bincount(groups), 1)
-        pooled = (np.bincount(groups, own**2) / count)[groups]
-        return np.sqrt((1.0 - POOLED) * own**2 + POOLED * pooled)
+    def _at_one(self, probes: np.ndarray, groups: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The a (m,) of each probe's V(n), relative to its squared ``scale`` (m,), and the s (g,) of each group's."""
+        count, pairs = int(groups.max(initial=-1)) + 1, sorted(self._squares, key=sum)
+        if not pairs:
+            return np.full(len(probes), np.nan), np.full(count, SLOPE)
+        # A dark probe has no error.
+        factor = np.where(scale > 0, 1.0 / np.where(scale > 0, scale, 1.0) ** 2, 0.0)
+        squares = np.stack([self._squares[pair][probes] * factor for pair in pairs], axis=1)
+        known = ~np.isnan(squares)
+        squares = np.where(known, squares, 0.0)
+        members = np.stack([np.bincount(groups, column, count) for column in known.T], axis=1)
+        means = np.stack([np.bincount(groups, column, count) for column in squares.T], axis=1) / np.maximum(members, 1)
+        slope = _slopes(np.log([n1 + n2 for n1, n2 in pairs]), means)
+        # The latest comparison has half the say, the one before it half of the rest.
+        age = np.cumsum(known[:, ::-1], axis=1)[:, ::-1] - 1
+        weight = np.where(known, REMEMBERED**age, 0.0)
+        alone = squares / np.stack([_disagreement(n1, n2, slope) for n1, n2 in pairs], axis=1)[groups]
+        alone = (alone * weight).sum(axis=1) / np.maximum(weight.sum(axis=1), 1e-300)
+        pooled = (np.bincount(groups, alone, count) / np.maximum(np.bincount(groups, minlength=count), 1))[groups]
+        return (1.0 - POOLED) * alone + POOLED * pooled, slope
 
 
-def ladder(rays: np.ndarray, highest: int) -> np.ndarray:
-    """The least number of rays not below ``rays`` (m,) on a ladder of four even rungs an octave from FIRST_ROUND up, at most
-    ``highest``: few enough different numbers that neighbouring probes can share their work."""
-    rung = FIRST_ROUND / 4.0 * 2.0 ** np.floor(np.log2(np.maximum(rays, FIRST_ROUND) / FIRST_ROUND))
-    return np.minimum(np.ceil(rays / rung) * rung, highest).astype(np.int64)
+def _disagreement(n1: int, n2: int, slope: np.ndarray) -> np.ndarray:
+    """w₁·w₂·E[d²] (g,) of sections of ``n1`` and ``n2`` points where V(n) = n^−2s with s = ``slope`` (g,)."""
+    exponent, whole = -2.0 * slope, float(n1 + n2)
+    return (n1 * float(n1) ** exponent + n2 * float(n2) ** exponent) / whole - whole**exponent
+
+
+def _slopes(logs: np.ndarray, means: np.ndarray) -> np.ndarray:
+    """The s (g,) of groups of probes from their mean squared differences ``means`` (g, l) (0: unknown) at numbers of rays with
+    ``logs`` (l,): straight lines by least squares, of all groups together first, from which each departs as far as its own
+    differences and the usual departure say."""
+    known = means > 0
+    count = np.maximum(known.sum(axis=1), 1)[:, None]
+    x = np.where(known, logs, 0.0)
+    y = np.where(known, np.log(np.where(known, means, 1.0)), 0.0)
+    x, y = (np.where(known, part - part.sum(axis=1, keepdims=True) / count, 0.0) for part in (x, y))
+    # A mean of squares with ν degrees of freedom has a logarithm of variance 2/ν.
+    precision = (x**2).sum(axis=1) * FREEDOM / 2.0
+    own = -0.5 * (x * y).sum(axis=1) * FREEDOM / 2.0
+    # s is half of a slope, so its precision is four times as much.
+    precision, own = 4.0 * precision, 4.0 * own
+    prior = 1.0 / SLOPE_SPREAD**2
+    # Of all together: a group says of it what its own departure leaves.
+    share = 1.0 / (1.0 + precision * SLOPE_DIFFERENCE**2)
+    common = (prior * SLOPE + (own * share).sum()) / (prior + (precision * share).sum())
+    usual = 1.0 / SLOPE_DIFFERENCE**2
+    return np.clip((usual * common + own) / (usual + precision), LEAST_SLOPE, MOST_SLOPE)

@@ -1,76 +1,132 @@
 """The bake: place probes, trace in rounds, grow the surface cache with what rays meet, stop each probe when it is good enough."""
 
 import time
+from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
-from ...errors import BakeError
 from ...numerics import octahedral, sh
-from ...numerics.grid import cell_size
 from ...progress import Progress
 from ...scene import ProbeVolume
+from ...scene.memory import require_memory
+from ...transport.cache.checkpoint import cache_state, labelled, part_of, restore_cache
+from ...transport.cache.surface_cache import SurfaceCache
+from ...transport.cache.texel_light import ALL_SOURCES
+from ...transport.cache.texels import Focus, TexelLayout, size_for
 from ...transport.context import LightContext
-from ...transport.parallel import parallel_for
-from ...transport.surface_cache import SurfaceCache
-from ...transport.texel_light import ALL_SOURCES
-from ...transport.texels import Focus, TexelLayout
 from ..base import Checkpoint, ProbeGrid
-from .adaptive import FIRST_ROUND, SAMPLING_SHARE, STRIDE, ErrorModel, ladder
-from .gather import GROUP, RAYS_PER_LIGHT_SAMPLE, Gatherer, Item
-from .placement import Placement, place
-from .relight import HitMemory
+from ..lamp_light import LampLight
+from ..lattice.coverage import require_open
+from ..lattice.focus import focus, spacing_of
+from ..lattice.placement import Placement, place
+from .adaptive import FIRST_ROUND, SAMPLING_SHARE, ErrorModel
+from .gather import GROUP, RAYS_PER_LIGHT_SAMPLE, Gatherer, Item, gather
+from .memory import BYTES_PER_RAY, ray_bytes, working_bytes
+from .reach import texels_in_reach
+from .relight import MAX_KEPT_RAYS, HitMemory
 from .settings import ProbeSettings
+from .shares import TEXEL_COST, Shares
 
-# Rays of a probe in one block: a multiple of what light samples come with, and a divisor of the first round.
+# Rays of a probe in one block: a multiple of what light samples come with, and those of the first round.
 BLOCK_RAYS = 64
 # Rays of one work item, and of all the items that are held in memory between tracing and shading.
 ITEM_RAYS, BATCH_RAYS = 1 << 16, 1 << 22
-# Texels that the surfaces around the probes are divided into at 1 % error; the number grows as the error falls, and falls more
+# The target error at which the numbers below hold.
+REFERENCE_ERROR = 0.01
+# Texels that the surfaces around the probes are divided into; the number grows as the error falls, and falls more
 # slowly as it grows: a coarse bake has few rays to average the texels' noise.
 TEXELS = 16000
-CACHE_RAYS = 64
+# Rays from each texel; the number doubles where the error halves, within these.
+CACHE_RAYS, FEWEST_CACHE_RAYS, MOST_CACHE_RAYS = 64, 32, 1024
 # So many times more where lamps are too many for shadow rays at every hit, and texels hold their light.
 MANY_LAMPS = 3.0
-# Direct light that varies by less than this over a texel is taken from the texel, at 1 % error.
+# Direct light that varies by less than this over a texel is taken from the texel.
 SMOOTHNESS = 0.1
+# That too goes with the error, within these.
+LEAST_SMOOTHNESS, MOST_SMOOTHNESS = 0.01, 0.2
+# Texels are no larger than this share of the spacing of probes, unless that made more than twice as many.
+TEXEL_SHARE, MOST_REFINED = 0.25, 2.0
+# Rays that a bake to a target error usually takes, in first rounds: what the progress bar goes by until errors are known.
+USUAL_ROUNDS = 6.0
+# How far a bake is when probes are placed, and when all rays are traced.
+PLACED, TRACED = 0.02, 0.97
+# What a cell of a probe's tile takes from those around it: by the cosine to this power, and so little that it counts only where the
+# cell has no ray of its own.
+SPREAD_POWER, SPREAD_WEIGHT = 64, 1e-4
+# Less than this share of a cell is none: what is denormal in float32 would take fifteen times as long and say nothing.
+LEAST_SPREAD = 1e-30
+
+
+@dataclass(frozen=True, eq=False)
+class Begun:
+    """What other work on a scene has done of its bake: its ``context``, and a surface ``cache`` made for the target ``error``."""
+
+    context: LightContext
+    cache: SurfaceCache
+    error: float
+
+    def serves(self, context: LightContext, volumes: tuple[ProbeVolume, ...], settings: ProbeSettings) -> bool:
+        """Whether a bake of ``volumes`` in ``context`` with ``settings`` may go on with the cache: texels may be larger than its
+        own by as much as one lattice may ask for smaller ones than another."""
+        cache = self.cache
+        return (context is self.context and self.error == settings.target and cache_rays(settings) == cache.rays
+                and cache.layout.size <= np.sqrt(MOST_REFINED) * 1.001 * texel_size(context, volumes, settings))
+
+
+class Block(NamedTuple):
+    """Some of a bake's probes where they stand, a surface cache that has met what they look at, and the ``brightness`` of all
+    probes (see ErrorModel)."""
+
+    placement: Placement
+    cache: SurfaceCache
+    brightness: float
 
 
 class ProbeBake:
-    """One bake of the volumes of ``scene`` with one set of settings, from rays to grids.
+    """One bake of ``volumes`` with one set of settings, from rays to grids: the light of ``context``, and of lamps ``lamp_light``.
 
     Rounds follow one another until ``_plan`` wants no more rays; within a round, batches of items. Between batches the whole
-    state is in arrays, and goes to ``checkpoint`` when that is due.
+    state is in arrays, and goes to ``checkpoint`` when that is due. ``begun`` lends its cache where it serves. A ``block`` is a
+    part of the probes of ``volumes``, that stand already, and the cache that knows what they look at.
     """
 
     def __init__(self, context: LightContext, volumes: tuple[ProbeVolume, ...], settings: ProbeSettings, seed: int,
-                 progress: Progress, checkpoint: Checkpoint, name: str):
-        self.context, self.volumes, self.settings = context, volumes, settings
+                 progress: Progress, checkpoint: Checkpoint, name: str, lamp_light: LampLight, begun: Begun | None = None,
+                 block: Block | None = None):
+        self.context, self.volumes, self.settings, self.lamp_light = context, volumes, settings, lamp_light
         self._progress, self._checkpoint, self._name = progress, checkpoint, name
-        progress.stage("placement")
-        self.placement: Placement = place(context, volumes, settings.virtual_offset, progress.span(0.0, 0.02))
-        self._check_placement()
-        self.cache = surface_cache(context, volumes, settings, seed)
+        if block is None:
+            progress.stage("placement")
+            self.placement: Placement = place(context, volumes, settings.virtual_offset, progress.span(0.0, PLACED))
+            require_open(volumes, self.placement.measured)
+            shared = begun is not None and begun.serves(context, volumes, settings)
+            self.cache = begun.cache if shared else surface_cache(context, volumes, settings, seed)
+        else:
+            self.placement, self.cache, _ = block
+        measured = self.placement.positions[self.placement.measured]
+        if block is not None:
+            self._texels = self.cache.count
+        else:
+            self._texels = texels_in_reach(context, self.cache.layout, measured, seed) if settings.bounces != 0 else 0
+        require_memory(working_bytes(self.cache, settings, self._texels, len(measured), BATCH_RAYS, MAX_KEPT_RAYS))
         self.gatherer = Gatherer(context, self.cache, self.placement, settings, seed)
         count = len(self.placement.positions)
-        self.model = ErrorModel(count, sh.coefficient_count(settings.order))
+        self.model = ErrorModel(count, sh.coefficient_count(settings.order), None if block is None else block.brightness)
         side = settings.visibility_resolution
         self._distance = np.zeros((count, side * side, 2), np.float32)
         self._distance_weight = np.zeros((count, side * side), np.float32)
         self._sums = np.zeros_like(self.model.total)
-        self.emitted = np.zeros_like(self.model.total) if context.surfaces.has_emission else None
+        self.emitted = np.zeros_like(self.model.total) if context.surfaces.has_emission or context.media.is_emissive else None
         self._goal: np.ndarray | None = None
+        self._needed: np.ndarray | None = None
         self._round = self._next = self.ray_count = 0
         self.memory = HitMemory()
-
-    def _check_placement(self) -> None:
-        start = 0
-        for volume in self.volumes:
-            stop = start + int(np.prod(volume.resolution))
-            if not self.placement.measured[start:stop].any():
-                raise BakeError(f"every probe of the volume {volume.name!r} lies inside geometry",
-                                "move or resize it so that it covers open space")
-            start = stop
+        if context.media.scatters:
+            # Walks in media met the lamps where they were.
+            self.memory.forget()
 
     def run(self) -> None:
         """Trace until every probe has met its error or its number of rays. Raises Cancelled or BakeError."""
@@ -83,45 +139,56 @@ class ProbeBake:
                 self._goal = self._plan()
                 if self._goal is None:
                     return
+                if self._round == len(self._rounds):
+                    # Now the probes themselves have said how many they want.
+                    require_memory({"rays": ray_bytes(self._expected_rays(), BATCH_RAYS, MAX_KEPT_RAYS)})
                 self._next = 0
                 self._sums[:] = 0
             self._trace_round()
             added = self._goal - self.model.rays
             probes = np.flatnonzero(added)
             self.model.add(probes, self._sums[probes], added[probes])
-            self._goal = None
+            self._goal = self._needed = None
             self._round += 1
+
+    @cached_property
+    def _rounds(self) -> list[int]:
+        """Rays that every probe has after each of the first rounds: doubled, so that there are differences to read the error and
+        how it falls from."""
+        step, settings = RAYS_PER_LIGHT_SAMPLE, self.settings
+        last = min(FIRST_ROUND, self._most) if settings.rays is None else -(-settings.rays // (2 * step)) * 2 * step
+        return sorted({max(step, last // part // step * step) for part in (4, 2, 1)})
+
+    @property
+    def _most(self) -> int:
+        """The most rays of a probe, in whole samples of light."""
+        return max(2 * RAYS_PER_LIGHT_SAMPLE, self.settings.max_rays // RAYS_PER_LIGHT_SAMPLE * RAYS_PER_LIGHT_SAMPLE)
 
     def _plan(self) -> np.ndarray | None:
         """How many rays each probe (p,) shall have after the next round, or None when enough were traced."""
-        rays, measured, settings = self.model.rays, self.placement.measured, self.settings
-        step = 2 * RAYS_PER_LIGHT_SAMPLE
-        first = min(FIRST_ROUND, settings.max_rays) if settings.rays is None else -(-settings.rays // step) * step
-        if self._round < 2:
-            # Two halves, so that there is a difference to read the error from.
-            return np.where(measured, first // step * RAYS_PER_LIGHT_SAMPLE if self._round == 0 else first, 0)
-        if settings.rays is not None:
+        rays, measured = self.model.rays, self.placement.measured
+        if self._round < len(self._rounds):
+            return np.where(measured, self._rounds[self._round], 0)
+        if self.settings.rays is not None:
             return None
-        probes = np.flatnonzero(measured)
-        needed = self.model.rays_needed(probes, self._groups(probes), settings.error * SAMPLING_SHARE)
-        wanting = (needed > rays[probes]) & (rays[probes] < settings.max_rays)
-        probes, needed = probes[wanting], needed[wanting]
-        if probes.size == 0:
-            return None
-        goal = rays.copy()
-        goal[probes] = ladder(np.maximum(STRIDE * needed, rays[probes] + 1), settings.max_rays)
-        return goal
+        needed = self._rays_needed()
+        return np.minimum(2 * rays, needed) if np.any(needed > rays) else None
+
+    def _rays_needed(self) -> np.ndarray:
+        """Rays (p,) that the probes are now thought to take to the target."""
+        if self._needed is None:
+            probes, self._needed = np.flatnonzero(self.placement.measured), self.model.rays.copy()
+            self._needed[probes] = self.model.rays_needed(probes, self._groups(probes), self.settings.error * SAMPLING_SHARE,
+                                                          self._most)
+        return self._needed
 
     def _expected_rays(self) -> float:
         """Rays that the whole bake is now thought to take, for the progress bar."""
-        goal = float(self._goal.sum())
         if self.settings.rays is not None:
             return self.placement.measured.sum() * float(self.settings.rays)
-        if self._round < 2:
-            return 6.0 * FIRST_ROUND * self.placement.measured.sum()
-        probes = np.flatnonzero(self.placement.measured)
-        needed = self.model.rays_needed(probes, self._groups(probes), self.settings.error * SAMPLING_SHARE)
-        return max(goal, float(np.clip(needed, self._goal[probes], self.settings.max_rays).sum()))
+        if self._round < len(self._rounds):
+            return USUAL_ROUNDS * FIRST_ROUND * self.placement.measured.sum()
+        return float(self._rays_needed().sum())
 
     @staticmethod
     def _groups(probes: np.ndarray) -> np.ndarray:
@@ -153,50 +220,42 @@ class ProbeBake:
         """Trace items, grow the cache by what they hit, shade them; in batches that bound memory. The batches depend on the
         items alone, so the result is the same for any number of threads."""
         items, expected, started, before = self._items(), self._expected_rays(), time.monotonic(), self.ray_count
-        while self._next < len(items):
-            stop, rays = self._next, 0
-            while stop < len(items) and (stop == self._next or rays + items[stop].ray_count <= BATCH_RAYS):
-                rays += items[stop].ray_count
-                stop += 1
+        of_texel = TEXEL_COST * self.cache.rays
+        for batch in batches(items[self._next:]):
+            rays = sum(item.ray_count for item in batch)
             rate = (self.ray_count - before) / max(time.monotonic() - started, 1e-3)
             label = f"probe rays, {rate / 1e6:.1f} M/s" if rate else "probe rays"
-            self._run_batch(items[self._next:stop], label, self._progress.span(
-                0.02 + 0.95 * min(1.0, self.ray_count / expected), 0.02 + 0.95 * min(1.0, (self.ray_count + rays) / expected)))
+            # The first batch meets nearly all texels that there will be, and in small bakes those are most of the work.
+            texels = max(self._texels, self.cache.count)
+            new = of_texel * (texels - self.cache.count)
+            total = expected + of_texel * texels
+            low = self.ray_count + of_texel * self.cache.count
+            done = [min(1.0, work / total) for work in (low, low + rays + new)]
+            self._run_batch(batch, label, self._progress.span(PLACED, TRACED).span(*done), Shares.of(rays, new, texels))
             self.ray_count += rays
-            self._next = stop
+            self._next += len(batch)
             if self._checkpoint.due:
                 self._checkpoint.save(self._name, self._state())
 
-    def _run_batch(self, batch: list[Item], label: str, progress: Progress) -> None:
-        threads = self.context.threads
-        traced = parallel_for(lambda i: self.gatherer.trace(batch[i]), len(batch), threads, progress.span(0.0, 0.4), label)
-        texels = [None] * len(batch)
-        if self.settings.bounces != 0:
-            texels = self.cache.reach([one.surface for one in traced], progress.span(0.4, 0.5))
-            self.cache.solve(self.settings.bounces, 0.01 * self.settings.target, progress.span(0.5, 0.6))
-        gathered = parallel_for(lambda i: self.gatherer.shade(batch[i], traced[i], texels[i]), len(batch), threads,
-                                progress.span(0.6, 1.0), label)
-        for item, hits, texel, one in zip(batch, traced, texels, gathered, strict=True):
-            self._sums[one.probes] += one.sh
-            self._distance[one.probes] += one.distance
-            self._distance_weight[one.probes] += one.distance_weight
-            self.memory.keep(item, hits, texel, one)
-            if one.emitted is not None:
-                self.emitted[one.probes] += one.emitted
+    def _run_batch(self, batch: list[Item], label: str, progress: Progress, shares: Shares) -> None:
+        require_memory({"rays": BYTES_PER_RAY * sum(item.ray_count for item in batch)})
+        for item, hits, texel, sums in zip(batch, *gather(self.gatherer, batch, progress, label, shares), strict=True):
+            self._sums[sums.probes] += sums.sh
+            self._distance[sums.probes] += sums.distance
+            self._distance_weight[sums.probes] += sums.distance_weight
+            self.memory.keep(item, hits, texel, sums)
+            if sums.emitted is not None:
+                self.emitted[sums.probes] += sums.emitted
 
     def _state(self) -> dict[str, np.ndarray]:
-        arrays = {f"cache.{name}": value for name, value in self.cache.state().items()}
-        arrays |= {f"model.{name}": value for name, value in self.model.state().items()}
         numbers = np.array([self._round, self._next, self.ray_count], np.int64)
-        return arrays | {"numbers": numbers, "goal": self._goal, "sums": self._sums, "distance": self._distance,
-                         "distance_weight": self._distance_weight}
+        kept = labelled("cache", cache_state(self.cache)) | labelled("model", self.model.state())
+        return kept | {"numbers": numbers, "goal": self._goal, "sums": self._sums, "distance": self._distance,
+                       "distance_weight": self._distance_weight}
 
     def _restore(self, arrays: dict[str, np.ndarray]) -> None:
-        def part(prefix):
-            return {name.removeprefix(prefix): value for name, value in arrays.items() if name.startswith(prefix)}
-
-        self.cache.restore(part("cache."))
-        self.model.restore(part("model."))
+        restore_cache(self.cache, part_of(arrays, "cache"))
+        self.model.restore(part_of(arrays, "model"))
         self._round, self._next, self.ray_count = (int(number) for number in arrays["numbers"])
         self._goal, self._sums = arrays["goal"], arrays["sums"]
         self._distance, self._distance_weight = arrays["distance"], arrays["distance_weight"]
@@ -204,19 +263,23 @@ class ProbeBake:
 
     def grids(self) -> tuple[ProbeGrid, ...]:
         """The measured probes as one grid per volume; probes inside geometry hold zeros."""
+        return self.cut(*self.measured())
+
+    def measured(self) -> tuple[np.ndarray, np.ndarray]:
+        """Coefficients (p, k, 3) and standard errors (p,) float32 of all probes; 0 and NaN inside geometry."""
         coefficients = self.model.coefficients()
         probes = np.flatnonzero(self.model.rays > 0)
-        if self.settings.direct and probes.size:
-            self._progress.step(0.98, "light of lamps")
-            coefficients[probes] += self.gatherer.lamps(probes)
+        if self.lamp_light and probes.size:
+            self._progress.step(TRACED, "light of lamps")
+            coefficients[probes] += self.lamp_light.coefficients(self.placement.positions[probes], self.settings.order)
         error = np.full(len(coefficients), np.nan, np.float32)
         error[probes] = self.model.error(probes, self._groups(probes)) / np.sqrt(3.0 * coefficients.shape[1])
-        return self.cut(coefficients.astype(np.float32), error)
+        return coefficients.astype(np.float32), error
 
     def cut(self, coefficients: np.ndarray, error: np.ndarray) -> tuple[ProbeGrid, ...]:
         """Grids of the volumes from ``coefficients`` (p, k, 3) and ``error`` (p,) of all probes."""
         side = self.settings.visibility_resolution
-        visibility = self._visibility
+        visibility = self.visibility
         result, start = [], 0
         for volume in self.volumes:
             shape = tuple(reversed(volume.resolution))
@@ -229,53 +292,67 @@ class ProbeBake:
         return tuple(result)
 
     @cached_property
-    def _visibility(self) -> np.ndarray:
+    def visibility(self) -> np.ndarray:
         """Mean and mean squared distance (p, T², 2) after the last round; a cell that no ray fell into takes a mean of those around
         it."""
         return mean_distances(self._distance, self._distance_weight, self.settings.visibility_resolution)
+
+
+def batches(items: list[Item]) -> Iterator[list[Item]]:
+    """``items`` in runs of up to BATCH_RAYS rays: what is held in memory between tracing and shading."""
+    start = 0
+    while start < len(items):
+        stop, rays = start, 0
+        while stop < len(items) and (stop == start or rays + items[stop].ray_count <= BATCH_RAYS):
+            rays += items[stop].ray_count
+            stop += 1
+        yield items[start:stop]
+        start = stop
 
 
 def mean_distances(sums: np.ndarray, weight: np.ndarray, resolution: int) -> np.ndarray:
     """Mean and mean squared distance (p, T², 2) from ``sums`` (p, T², 2) over the rays in each cell of a tile of ``resolution`` T
     and their numbers ``weight`` (p, T²)."""
     directions = octahedral.texel_directions(resolution).reshape(-1, 3)
-    around = (np.maximum(directions @ directions.T, 0) ** 64 * 1e-4).astype(np.float32)
-    return (sums + np.matmul(around, sums)) / np.maximum(weight + weight @ around, 1e-30)[:, :, None]
+    around = np.maximum(directions @ directions.T, 0) ** SPREAD_POWER * SPREAD_WEIGHT
+    around = np.where(around < LEAST_SPREAD, 0.0, around).astype(np.float32)
+    return (sums + np.matmul(around, sums)) / np.maximum(weight + weight @ around, LEAST_SPREAD)[:, :, None]
 
 
 def surface_cache(context: LightContext, volumes: tuple[ProbeVolume, ...], settings: ProbeSettings, seed: int) -> SurfaceCache:
     """The empty surface cache for a bake of ``volumes``."""
-    refine = settings.target / 0.01
-    texels = TEXELS / min(refine, np.sqrt(refine)) * (MANY_LAMPS if context.lamps.count > ALL_SOURCES else 1.0)
-    size = settings.texel_size or texel_size(context, volumes, texels)
-    layout = TexelLayout(context.geometry, Focus(*focus(volumes), size))
-    rays = settings.cache_rays or cache_rays(settings)
-    return SurfaceCache(context, layout, seed, rays, smoothness=float(np.clip(SMOOTHNESS * refine, 0.01, 0.2)))
+    lit_alike = context.links.lit_alike if context.links.has_receivers else None
+    layout = TexelLayout(context.geometry, Focus(*focus(volumes), texel_size(context, volumes, settings)), lit_alike)
+    smoothness = float(np.clip(SMOOTHNESS * settings.target / REFERENCE_ERROR, LEAST_SMOOTHNESS, MOST_SMOOTHNESS))
+    return SurfaceCache(context, layout, seed, cache_rays(settings), smoothness=smoothness)
 
 
 def cache_rays(settings: ProbeSettings) -> int:
-    """Rays from each texel of the surface cache that go with the target error."""
-    return int(np.clip(CACHE_RAYS * 2 ** round(np.log2(0.01 / settings.target)), 32, 1024))
+    """Rays from each texel of the surface cache: as set, or what goes with the target error."""
+    wanted = CACHE_RAYS * 2 ** round(np.log2(REFERENCE_ERROR / settings.target))
+    return settings.cache_rays or int(np.clip(wanted, FEWEST_CACHE_RAYS, MOST_CACHE_RAYS))
 
 
-def focus(volumes: tuple[ProbeVolume, ...]) -> tuple[np.ndarray, float]:
-    """Centre (3,) and radius [m] of a sphere around all volumes."""
-    unit = np.array([[x, y, z, 1] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float64)
-    corners = np.concatenate([(unit @ np.asarray(volume.world_from_local).T)[:, :3] for volume in volumes])
-    center = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
-    return center, float(np.linalg.norm(corners - center, axis=1).max())
+def texel_size(context: LightContext, volumes: tuple[ProbeVolume, ...], settings: ProbeSettings) -> float:
+    """Side [m] of the cache's texels: as set, or small enough for the number that goes with target error and lamps on what lies
+    near, or for twice as many where probes stand so dense, and so close to walls, that a texel should be no more than a quarter of
+    a cell."""
+    if settings.texel_size:
+        return settings.texel_size
+    return texel_for(usual_texel(context, volumes, settings), spacing_of(volumes))
 
 
-def texel_size(context: LightContext, volumes: tuple[ProbeVolume, ...], texels: float) -> float:
-    """Side [m] of the cache's texels: small enough for some ``texels`` on what lies near, or for twice as many where probes stand
-    so dense, and so close to walls, that a texel should be no more than a quarter of a cell."""
-    center, radius = focus(volumes)
-    corners = context.geometry.triangles_world
-    gap = np.maximum(np.maximum(corners.min(axis=1) - center, center - corners.max(axis=1)), 0)
-    distance = np.sqrt((gap**2).sum(axis=1))
-    # A triangle counts by what of it lies within the focus, or by how small it looks from there.
-    share = np.minimum(1.0, (radius / np.maximum(distance, radius)) ** 2)
-    area = np.minimum(context.geometry.areas * share, 4.0 * np.pi * radius**2).sum(dtype=np.float64)
-    spacing = min(cell_size(volume.world_from_local, volume.resolution).min() for volume in volumes)
-    size = np.sqrt(max(area, 1e-12) / texels)
-    return float(np.clip(0.25 * spacing, size / np.sqrt(2.0), size))
+def usual_texel(context: LightContext, volumes: tuple[ProbeVolume, ...], settings: ProbeSettings) -> float:
+    """Side [m] of the cache's texels that goes with target error and lamps, however dense the probes of ``volumes`` are."""
+    return size_for(context.geometry, *focus(volumes), usual_texels(context, settings))
+
+
+def usual_texels(context: LightContext, settings: ProbeSettings) -> float:
+    """About how many texels of that size there are around the probes."""
+    refine = settings.target / REFERENCE_ERROR
+    return TEXELS / min(refine, np.sqrt(refine)) * (MANY_LAMPS if context.lamps.count > ALL_SOURCES else 1.0)
+
+
+def texel_for(usual: float, spacing: float) -> float:
+    """Side [m] of the cache's texels where probes stand ``spacing`` [m] apart and ``usual_texel`` would do otherwise."""
+    return float(np.clip(TEXEL_SHARE * spacing, usual / np.sqrt(MOST_REFINED), usual))

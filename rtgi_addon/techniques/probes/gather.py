@@ -4,28 +4,39 @@ A few neighbouring probes share their directions: SH projection is then a matrix
 points find the same part of the BVH. Groups are scrambled independently of one another, so their errors are too.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
+from ... import kernels
 from ...numerics import octahedral, sh
-from ...numerics.sampling import hash_u32, sobol_owen, sobol_owen_at, sphere_from_square
+from ...numerics.sampling import hash_u32, sobol_owen_at, sphere_from_square, unit_interval, wrapped
+from ...progress import Progress
+from ...transport.cache.hit_light import EndRays, HitLight
+from ...transport.cache.media_walks import ends_on, light_of_ends
+from ...transport.cache.surface_cache import SurfaceCache
+from ...transport.cache.texel_table import SurfaceHits
 from ...transport.context import LightContext
-from ...transport.surface_cache import SurfaceCache
-from ...transport.texel_light import ALL_SOURCES, CHOICES
-from ...transport.texel_table import SurfaceHits
+from ...transport.parallel import parallel_for
+from ...transport.paths.direct import connect_emitters
+from ...transport.paths.scattering import Walks, walk
 from ...transport.vectors import dot
+from .gather_kernels import can_project, follows, project, projected, shifted, traced, visibility
+from .item_rays import DIRECTION, RAYS_PER_LIGHT_SAMPLE, ItemRays
+from .shares import USUAL, Shares
 
 # Probes that share a set of directions.
 GROUP = 8
-# One emitter (and one bright world) sample for so many rays.
-RAYS_PER_LIGHT_SAMPLE = 8
-# Samples of each lamp that has an extent, where its direct light is wanted.
-LAMP_SAMPLES = 64
 # Distances are averaged over this many rays of each probe: with 64 cells to a tile, as many as tell.
 VISIBILITY_RAYS = 1024
+# The cache's solution may be off by this share of the target error.
+SOLVER_SHARE = 0.01
+# How far a batch is when its rays are traced, and when the cache has grown by what they met, and is solved.
+# What numbers are drawn for beside the directions of rays: each purpose has sequences of its own.
+_BRIGHT_SKY, _EMITTERS, _BRIGHT_SURFACES, _SHIFTS, _WALKS = 3, 4, 5, 17, 23
 _UNIFORM_PDF = np.float32(1.0 / (4.0 * np.pi))
+FULL_SPHERE = np.float32(4.0 * np.pi)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,12 +82,32 @@ class Item:
 
 @dataclass(eq=False)
 class Traced:
-    """What an item's rays met: ``rows`` (h,) of those that hit ``surface`` (h,) at ``t`` (h,), and the ``directions`` (g·n, 3)."""
+    """What an item's rays met: ``rows`` (h,) int32 of those that hit ``surface`` (h,) at ``t`` (h,) under ``cosine`` (h,), that
+    between the front's normal and the way back; the ``directions`` (g·n, 3), and the ``tint`` (g·n·m, 3) of what comes along each
+    ray (None: unchanged); ``media``: what there is on their way (None: nothing)."""
 
     surface: SurfaceHits
     rows: np.ndarray
     t: np.ndarray
+    cosine: np.ndarray
     directions: np.ndarray
+    tint: np.ndarray | None
+    media: "InMedia | None" = None
+
+    def take(self, rows: np.ndarray) -> "Traced":
+        """The given hits only."""
+        return replace(self, surface=self.surface.take(rows), rows=self.rows[rows], t=self.t[rows], cosine=self.cosine[rows])
+
+
+@dataclass(frozen=True, eq=False)
+class InMedia:
+    """The ``walks`` in media that began along an item's rays, and those of their ``ends`` (e,) that are on surfaces: where, and
+    under which ``cosines`` (e,)."""
+
+    walks: Walks
+    ends: np.ndarray
+    surface: SurfaceHits
+    cosines: np.ndarray
 
 
 @dataclass(eq=False)
@@ -95,44 +126,66 @@ class Gathered:
 
 
 class Gatherer:
-    """Traces and shades items against one context and one surface cache. ``pdf`` is the density [1/sr] of its directions."""
+    """Traces and shades items against one ``context`` and one surface ``cache``, under ``settings``. ``pdf`` is the density [1/sr]
+    of its directions."""
 
     pdf = _UNIFORM_PDF
 
     def __init__(self, context: LightContext, cache: SurfaceCache, placement, settings, seed: int):
-        self._context, self._cache, self._placement, self._seed = context, cache, placement, seed
+        self.context, self.cache, self._placement, self.settings, self._seed = context, cache, placement, settings, seed
+        self._hit_light = HitLight(cache)
         self._order, self._resolution = settings.order, settings.visibility_resolution
-        self._bounces = settings.bounces
         self._albedo = context.surfaces.albedo_by_triangle()
+        self._shift_tables: dict[tuple[int, int], np.ndarray] = {}
         emitters = context.emitters
         self._sample_emitters = emitters.count > 0 and cache.emitter_samples > 0
 
     def trace(self, item: Item) -> Traced:
         """Nearest hits of an item's rays."""
         directions = self.directions(item)
+        # Live probes have no cache: their hits have a side and no texel.
+        texels = getattr(self.cache.layout, "cells", None) is not None
+        if follows(self.context.tracer) and texels and not self.cache.walks_media:
+            found = traced(self.context.tracer, self.cache.layout, self._placement.positions[item.probes], directions)
+            return Traced(*found, directions, None)
         rays = np.repeat(directions, item.shape[2], axis=0)
-        hits = self._context.tracer.intersect(self._origins(item, item.shape[1]), rays)
-        rows = np.flatnonzero(hits.primitive >= 0)
+        hits = self.context.tracer.intersect(self._origins(item, item.shape[1]), rays)
+        rows = np.flatnonzero(hits.primitive >= 0).astype(np.int32)
         primitive, u, v = hits.primitive[rows], hits.u[rows], hits.v[rows]
-        front = dot(self._context.geometry.normals_world[primitive], rays[rows]) < 0
-        slots = self._cache.layout.slots(primitive, u, v, front)
-        return Traced(SurfaceHits(primitive, u, v, slots), rows, hits.t[rows], directions)
+        cosine = -dot(self.context.geometry.normals_world[primitive], rays[rows])
+        slots = self.cache.layout.slots(primitive, u, v, cosine > 0)
+        media = self._in_media(item, rays, hits.t) if self.cache.walks_media else None
+        return Traced(SurfaceHits(primitive, u, v, slots), rows, hits.t[rows], cosine, directions, hits.tint, media)
+
+    def _in_media(self, item: Item, rays: np.ndarray, limits: np.ndarray) -> InMedia:
+        """Walks along an item's ``rays`` up to ``limits``."""
+        g, n, _ = item.shape
+        ray = (item.first[:, None] + np.arange(n)).reshape(g, n, 1)
+        key = hash_u32(item.probes[:, None, :], ray, self._seed, _WALKS).reshape(-1)
+        walks = walk(self.context, self.cache.sources, self._origins(item, n), rays, limits, key,
+                     most_turns=self.settings.bounces)
+        return InMedia(walks, *ends_on(self.context, self.cache.layout, walks))
 
     def directions(self, item: Item) -> np.ndarray:
         """Directions (g·n, 3) that the probes of each group share."""
-        return sphere_from_square(self._numbers(item, 2).reshape(-1, 2))
+        return sphere_from_square(self._numbers(item, DIRECTION).reshape(-1, DIRECTION))
 
     def _origins(self, item: Item, n: int) -> np.ndarray:
         """Where ``n`` rays from each probe start: (g·n·m, 3)."""
         positions = self._placement.positions[item.probes][:, None]
         return np.broadcast_to(positions, (len(item.groups), n, *positions.shape[2:])).reshape(-1, 3)
 
+    def positions_of(self, item: Item) -> np.ndarray:
+        """The probes of the item: (g, m, 3)."""
+        return self._placement.positions[item.probes]
+
+    def positions(self, item: Item, rows: np.ndarray) -> np.ndarray:
+        """Where the rays ``rows`` (h,) start: (h, 3)."""
+        return self._placement.positions[item.probe_of(rows)]
+
     def under(self, context: LightContext, cache: SurfaceCache) -> "Gatherer":
         """The same probes and directions under other light."""
-        other = object.__new__(Gatherer)
-        other.__dict__.update(self.__dict__)
-        other._context, other._cache = context, cache
-        return other
+        return Gatherer(context, cache, self._placement, self.settings, self._seed)
 
     def _numbers(self, item: Item, last: int, first: int = 0) -> np.ndarray:
         """Dimensions ``first`` … ``last`` − 1 of the groups' sequences: (g, n, last − first)."""
@@ -144,119 +197,113 @@ class Gatherer:
         index = item.first[:, None] // RAYS_PER_LIGHT_SAMPLE + np.arange(item.count // RAYS_PER_LIGHT_SAMPLE)
         return sobol_owen_at(index, dimensions, hash_u32(self._seed, item.groups, purpose)[:, None])
 
-    def shade(self, item: Item, traced: Traced, texel: np.ndarray | None) -> Gathered:
-        """Radiance along the traced rays, projected. ``texel`` (h,) is the cache's for each hit, None if nothing is reflected."""
-        radiance = np.zeros((*item.shape, 3), np.float32)
-        albedo = None
+    def shade(self, item: Item, traced: Traced, texel: np.ndarray | None, ends: np.ndarray | None = None) -> Gathered:
+        """Radiance along the traced rays, projected. ``texel`` (h,) is the cache's for each hit, None if nothing is reflected;
+        ``ends`` (e,) those of where walks in media ended."""
+        albedo, reflected = None, np.zeros((len(traced.rows), 3), np.float32)
         if texel is not None:
-            hits = traced.surface
-            albedo = self._context.surfaces.albedo(hits.primitive, hits.u, hits.v) if self._albedo is None else None
-            radiance.reshape(-1, 3)[traced.rows] = self._reflected(item, traced, texel, albedo)
-        if not self._context.environment.is_black:
-            radiance += self.sky(item, traced)
+            hits, rays = traced.surface, ItemRays(self, item, traced)
+            albedo = None if self._albedo is not None else self.context.surfaces.albedo(hits.primitive, hits.u, hits.v,
+                                                                                        traced.cosine)
+            of_hits = albedo
+            if self._albedo is not None:
+                # As many hits as triangles would be taken for the albedo of hits.
+                alike = len(self._albedo) == len(texel)
+                of_hits = np.take(self._albedo, hits.primitive, axis=0) if alike else self._albedo
+            reflected = self._hit_light.reflected(hits, texel, of_hits, rays)
         basis = self.basis(item, traced.directions)
-        total = project(basis, radiance) * np.float32(4.0 * np.pi) + self._light_samples(item, texel is not None)
+        sky = None if self.context.environment.is_black else self.context.environment.base_radiance(traced.directions)
+        scattered = None if traced.media is None else self._scattered(traced.media, ends)
+        total = self._projected(item, traced, basis, reflected, sky, scattered) + self._light_samples(item, texel is not None)
         emitted = None
-        if self._context.surfaces.has_emission:
-            radiance[:] = 0
-            radiance.reshape(-1, 3)[traced.rows] = self._emitted(item, traced)
-            emitted = project(basis, radiance) * np.float32(4.0 * np.pi) + self._emitter_samples(item)
+        if self.context.surfaces.has_emission or self.context.media.is_emissive:
+            glow = self._emitted(item, traced) if self.context.surfaces.has_emission else np.zeros_like(reflected)
+            of_media = None if traced.media is None else traced.media.walks.emitted
+            emitted = self._projected(item, traced, basis, glow, None, of_media) + self._emitter_samples(item)
             total = total + emitted
         return Gathered(item.merged_probes, item.merged(total), None if emitted is None else item.merged(emitted), albedo,
                         *(item.merged(part) for part in self._visibility(item, traced)))
 
+    def look(self, item: Item, traced: Traced) -> Gathered:
+        """What rays tell without light: ``Gathered`` with no SH."""
+        albedo = None
+        if self._albedo is None:
+            hits = traced.surface
+            albedo = self.context.surfaces.albedo(hits.primitive, hits.u, hits.v, traced.cosine)
+        none = np.zeros((*item.merged_probes.shape, 0, 3), np.float32)
+        return Gathered(item.merged_probes, none, None, albedo, *(item.merged(part) for part in self._visibility(item, traced)))
+
     def basis(self, item: Item, directions: np.ndarray) -> np.ndarray:
         """SH basis (g, n, k) of directions (g·n, 3)."""
-        return sh.evaluate(directions, self._order).reshape(len(item.groups), -1, sh.coefficient_count(self._order))
+        return sh.evaluate_rows(directions, self._order).reshape(len(item.groups), -1, sh.coefficient_count(self._order))
 
-    def sky(self, item: Item, traced: Traced) -> np.ndarray:
-        """Radiance (g, n, m, 3) of the world, without its bright patches, along the rays that hit nothing; 0 along the others."""
-        missed = np.ones(item.ray_count, bool)
-        missed[traced.rows] = False
-        sky = self._context.environment.base_radiance(traced.directions).reshape(*item.shape[:2], 1, 3)
-        return np.where(missed.reshape(*item.shape, 1), sky, np.float32(0))
+    def _projected(self, item: Item, traced: Traced, basis: np.ndarray, radiance: np.ndarray, sky: np.ndarray | None,
+                   along: np.ndarray | None) -> np.ndarray:
+        """Sums (g, m, k, 3) of 4π·L·Y: ``radiance`` (h, 3) of what the rays hit, of the others ``sky`` (g·n, 3) in each direction
+        (None: black), with what surfaces that rays passed make of it, and ``along`` (g·n·m, 3) the rays (None: nothing)."""
+        if traced.tint is None and along is None and can_project(basis):
+            return projected(item.shape, basis, traced.rows, radiance, sky) * FULL_SPHERE
+        light = np.zeros((*item.shape, 3), np.float32)
+        if sky is not None:
+            light[:] = sky.reshape(*item.shape[:2], 1, 3)
+        light.reshape(-1, 3)[traced.rows] = radiance
+        if traced.tint is not None:
+            light *= traced.tint.reshape(light.shape)
+        if along is not None:
+            light += along.reshape(light.shape)
+        return project(basis, light) * FULL_SPHERE
 
-    def _reflected(self, item: Item, traced: Traced, texel: np.ndarray, albedo: np.ndarray | None) -> np.ndarray:
-        cache = self._cache
-        irradiance = np.take(cache.irradiance_rest, texel, axis=0, mode="wrap")
-        if cache.sources.count:
-            irradiance += self._direct(item, traced, texel)
-        irradiance *= np.take(self._albedo, traced.surface.primitive, axis=0) if albedo is None else albedo
-        irradiance *= np.float32(1.0 / np.pi)
-        return irradiance
+    def _scattered(self, media: InMedia, texel: np.ndarray | None) -> np.ndarray:
+        """Radiance (rays, 3) that media scatter along the rays: of light sources, and of what their walks ended on."""
+        walks, hits = media.walks, media.surface
+        light = light_of_ends(self.context, walks, media.ends, hits, media.cosines)
+        if texel is not None and len(media.ends):
+            albedo = self.context.surfaces.albedo(hits.primitive, hits.u, hits.v, -media.cosines)
+            rays = EndRays(walks, media.ends, media.cosines, self._seed)
+            light[media.ends] += self._hit_light.reflected(hits, texel, albedo, rays) * walks.tint[media.ends]
+        radiance = walks.gained.copy()
+        radiance[walks.rows] += light
+        return radiance
 
     def _emitted(self, item: Item, traced: Traced) -> np.ndarray:
-        surfaces, result = self._context.surfaces, np.zeros((len(traced.rows), 3), np.float32)
-        rows = np.flatnonzero(surfaces.emissive[self._context.geometry.material[traced.surface.primitive]])
-        found = traced.surface.take(rows)
-        emission = surfaces.emission(found.primitive, found.u, found.v)
+        surfaces, result = self.context.surfaces, np.zeros((len(traced.rows), 3), np.float32)
+        rows = np.flatnonzero(surfaces.emissive[self.context.geometry.material[traced.surface.primitive]])
+        hits, rays = traced.surface.take(rows), ItemRays(self, item, traced)
+        emission = surfaces.emission(hits.primitive, hits.u, hits.v, rays.cosine(rows))
         if self._sample_emitters:
-            density = self._density(item, traced, rows)
-            by_light = self._context.emitters.pdf_area(found.primitive) / RAYS_PER_LIGHT_SAMPLE
-            emission = emission * (density / np.maximum(density + by_light, 1e-30))[:, None]
+            pdf = self.context.emitters.pdf_area(hits.primitive, hits.u, hits.v)
+            emission = emission * rays.share(rows, pdf)
         result[rows] = emission
         return result
 
-    def _density(self, item: Item, traced: Traced, rows: np.ndarray) -> np.ndarray:
-        """Density (n,) [m⁻²] of probe rays on the surfaces that the given hits met."""
-        directions = traced.directions[traced.rows[rows] // item.shape[2]]
-        cosine = np.abs(dot(self._context.geometry.normals_world[traced.surface.primitive[rows]], directions))
-        return self.pdf * cosine / np.maximum(traced.t[rows] ** 2, np.float32(1e-20))
-
-    def _direct(self, item: Item, traced: Traced, texel: np.ndarray) -> np.ndarray:
-        """Irradiance (h, 3) of lamps and bright sky at hits, less what is sampled as a bright surface: the texel's mean where that
-        is smooth, shadow rays from the hit elsewhere."""
-        cache = self._cache
-        total = np.take(cache.irradiance_direct, texel, axis=0, mode="wrap")
-        uneven = np.flatnonzero(~np.take(cache.smooth[:, 0], texel, mode="wrap"))
-        if uneven.size:
-            total[uneven] = self._direct_at(item, traced, texel, uneven)
-        if cache.bright.count:
-            pdf = np.take(cache.bright.pdf_area, texel, mode="wrap")
-            found = np.flatnonzero(pdf)
-            density = self._density(item, traced, found)
-            total[found] *= (density / np.maximum(density + pdf[found] / RAYS_PER_LIGHT_SAMPLE, 1e-30))[:, None]
-        return total
-
-    def _direct_at(self, item: Item, traced: Traced, texel: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-        """One shadow ray from each of the ``chosen`` (c,) hits to each of a few sources, or to one picked from the texel's."""
-        cache, hits, rows, t = self._cache, traced.surface.take(chosen), traced.rows[chosen], traced.t[chosen]
-        points = np.take(traced.directions, rows // item.shape[2], axis=0) * t[:, None]
-        points += self._placement.positions[item.probe_of(rows)]
-        _, _, _, _, shading, face = cache.surface_at(hits.slots, hits.primitive, hits.u, hits.v, points)
-        if cache.sources.count <= ALL_SOURCES:
-            numbers = None if cache.sources.is_delta.all() else self._shifted(item, rows, 2, 4)
-            total = np.zeros((len(rows), 3), np.float32)
-            for source in range(cache.sources.count):
-                uv = np.zeros((len(rows), 2), np.float32) if cache.sources.is_delta[source] else _turn(numbers, source)
-                total += cache.sources.irradiance(source, points, shading, face, t, uv)
-            return total
-        numbers = self._shifted(item, rows, 2, 5)
-        column = np.minimum((numbers[:, 2] * CHOICES).astype(np.int64), CHOICES - 1)
-        source, weight = cache.choices[texel[chosen], column], cache.choice_weights[texel[chosen], column]
-        return cache.sources.irradiance(source.astype(np.int64), points, shading, face, t, numbers[:, :2]) * weight[:, None]
-
-    def _shifted(self, item: Item, rows: np.ndarray, first: int, last: int) -> np.ndarray:
+    def shifted(self, item: Item, rows: np.ndarray, first: int, last: int) -> np.ndarray:
         """(h, last − first): the sequences' further dimensions for the rays ``rows`` (h,), shifted on the torus for each probe."""
-        probes = item.probe_of(rows)
-        numbers = np.take(self._numbers(item, last, first).reshape(-1, last - first), rows // item.shape[2], axis=0)
-        every = np.arange(len(self._placement.positions))
-        for d in range(first, last):
-            numbers[:, d - first] += np.take(_fraction(hash_u32(every, d, self._seed, 17)), probes)
-        return numbers - np.floor(numbers)
+        numbers, shifts = self._numbers(item, last, first), self._shifts(first, last)
+        if kernels.is_available():
+            return shifted(item.shape, numbers, item.probes, rows, shifts)
+        numbers = np.take(numbers.reshape(-1, last - first), rows // item.shape[2], axis=0)
+        return wrapped(numbers + np.take(shifts, item.probe_of(rows), axis=0))
+
+    def _shifts(self, first: int, last: int) -> np.ndarray:
+        """(p, last − first) in [0, 1): by how much dimensions are shifted for each probe."""
+        if (first, last) not in self._shift_tables:
+            every = np.arange(len(self._placement.positions))
+            columns = [unit_interval(hash_u32(every, d, self._seed, _SHIFTS)) for d in range(first, last)]
+            self._shift_tables[first, last] = np.stack(columns, axis=1)
+        return self._shift_tables[first, last]
 
     def _light_samples(self, item: Item, reflected: bool) -> np.ndarray:
         """Sums (g, m, k, 3), in the units of Gathered.sh, of bright sky and bright surfaces sampled from the probes."""
-        surfaces, count = self._cache.bright, sh.coefficient_count(self._order)
+        surfaces, count = self.cache.bright, sh.coefficient_count(self._order)
         total = np.zeros((*item.probes.shape, count, 3), np.float32)
         if item.shape[1] < RAYS_PER_LIGHT_SAMPLE:
             return total
-        if self._context.environment.bright.count:
+        if self.context.environment.bright.count:
             total += self.bright_sky(item)
         if reflected and surfaces.count:
             # Each probe meets its own points of the pool, in the sequence's order.
-            numbers = self._light_numbers(item, 1, 5) + _fraction(hash_u32(item.probes, self._seed, 5))[:, None]
-            numbers = (numbers - np.floor(numbers)).reshape(-1)
+            shift = unit_interval(hash_u32(item.probes, self._seed, _BRIGHT_SURFACES))[:, None]
+            numbers = wrapped(self._light_numbers(item, 1, _BRIGHT_SURFACES) + shift).reshape(-1)
             origins = self._origins(item, item.shape[1] // RAYS_PER_LIGHT_SAMPLE)
             total += self._connected(item, *surfaces.connect(numbers, origins, 1 / RAYS_PER_LIGHT_SAMPLE, self.pdf))
         return total
@@ -265,9 +312,9 @@ class Gatherer:
         """The part of ``_light_samples`` that comes from bright patches of the world (g, m, k, 3)."""
         g, n, m = item.shape
         n //= RAYS_PER_LIGHT_SAMPLE
-        directions, weight = self._context.environment.bright.sample(self._light_numbers(item, 2, 3).reshape(-1, 2))
-        free = ~self._context.tracer.occluded(self._origins(item, n), np.repeat(directions, m, axis=0))
-        seen = np.where(free.reshape(g, n, m, 1), weight.reshape(g, n, 1, 3), np.float32(0))
+        directions, weight = self.context.environment.bright.sample(self._light_numbers(item, 2, _BRIGHT_SKY).reshape(-1, 2))
+        passed = self.context.tracer.transmittance(self._origins(item, n), np.repeat(directions, m, axis=0))
+        seen = weight.reshape(g, n, 1, 3) * passed.reshape(g, n, m, -1)
         return project(self.basis(item, directions), seen) * np.float32(RAYS_PER_LIGHT_SAMPLE)
 
     def _emitter_samples(self, item: Item) -> np.ndarray | np.float32:
@@ -275,43 +322,25 @@ class Gatherer:
         n = item.shape[1] // RAYS_PER_LIGHT_SAMPLE
         if n == 0 or not self._sample_emitters:
             return np.float32(0)
-        xi = self._light_numbers(item, 3, 4).reshape(-1, 3)
-        return self._connected(item, *self._connect_emitters(xi, self._origins(item, n), item.shape[2]))
+        # Each sample is shared by the probes of its group.
+        emitted = self.context.emitters.sample(self._light_numbers(item, 3, _EMITTERS).reshape(-1, 3)).repeated(item.shape[2])
+        connected = connect_emitters(self.context, emitted, self._origins(item, n), 1 / RAYS_PER_LIGHT_SAMPLE, self.pdf)
+        return self._connected(item, *connected)
 
     def _connected(self, item: Item, directions: np.ndarray, contributions: np.ndarray) -> np.ndarray:
         """Sums (g, m, k, 3) of connections from the item's probes, ordered like its light samples."""
         g, n, m = len(item.groups), item.shape[1] // RAYS_PER_LIGHT_SAMPLE, item.shape[2]
-        basis = np.ascontiguousarray(sh.evaluate(directions, self._order)).reshape(g, n, m, -1)
+        basis = sh.evaluate_rows(directions, self._order).reshape(g, n, m, -1)
         return np.matmul(basis.transpose(0, 2, 3, 1), contributions.reshape(g, n, m, 3).transpose(0, 2, 1, 3))
-
-    def lamps(self, probes: np.ndarray) -> np.ndarray:
-        """The direct light of lamps as SH coefficients (m, k, 3) of ``probes`` (m,)."""
-        sources, points = self._cache.sources, self._placement.positions[probes]
-        result = np.zeros((len(probes), sh.coefficient_count(self._order), 3))
-        for lamp in range(self._context.lamps.count):
-            samples = 1 if sources.is_delta[lamp] else LAMP_SAMPLES
-            for xi in sobol_owen(samples, 2, hash_u32(self._seed, lamp, 6)):
-                directions, irradiance = sources.facing_irradiance(lamp, points, np.tile(xi, (len(points), 1)))
-                result += sh.evaluate(directions, self._order)[:, :, None] * (irradiance / np.float32(samples))[:, None, :]
-        return result
-
-    def _connect_emitters(self, xi: np.ndarray, origins: np.ndarray, m: int):
-        """As BrightSurfaces.connect, for emissive triangles: directions and contributions, each sample shared by m probes."""
-        target, normal, emission, pdf_area, _ = (np.repeat(part, m, axis=0) for part in self._context.emitters.sample(xi))
-        towards = target - origins
-        squared = np.maximum(dot(towards, towards), np.float32(1e-20))
-        distance = np.sqrt(squared)
-        directions = towards / distance[:, None]
-        free = ~self._context.tracer.occluded(origins, directions, distance * np.float32(1 - 1e-4))
-        transfer = np.abs(dot(normal, directions)) / squared
-        share = transfer / np.maximum(pdf_area / RAYS_PER_LIGHT_SAMPLE + self.pdf * transfer, np.float32(1e-30))
-        return directions, np.where(free[:, None], emission * share[:, None], np.float32(0))
 
     def _visibility(self, item: Item, traced: Traced) -> tuple[np.ndarray, np.ndarray]:
         g, n, m = item.shape
         tiles = self._resolution**2
         sums, weights = np.zeros((g * tiles, m, 2), np.float32), np.zeros(g * tiles, np.float32)
         early = np.flatnonzero(np.repeat(item.first < VISIBILITY_RAYS, n))
+        if early.size and kernels.is_available():
+            return visibility(item.shape, item.first < VISIBILITY_RAYS, octahedral.texel_index(traced.directions, self._resolution),
+                              tiles, self._placement.reach[item.probes], traced.rows, traced.t)
         if early.size:
             t = np.full(item.ray_count, np.inf, np.float32)
             t[traced.rows] = traced.t
@@ -325,20 +354,18 @@ class Gatherer:
         return sums.reshape(g, tiles, m, 2).transpose(0, 2, 1, 3), weights.reshape(g, 1, tiles)
 
 
-def _turn(numbers: np.ndarray, source: int) -> np.ndarray:
-    """Another shift on the torus for each further source, so that lamps are not sampled in step."""
-    turned = numbers + np.float32(0.381966 * source)
-    return turned - np.floor(turned)
-
-
-def _fraction(hashed: np.ndarray) -> np.ndarray:
-    return (hashed >> np.uint32(8)).astype(np.float32) * np.float32(2.0**-24)
-
-
-def project(basis: np.ndarray, radiance: np.ndarray) -> np.ndarray:
-    """Sum over directions of ``basis`` (g, n, k) times ``radiance`` (g, n, m, c): (g, m, k, c)."""
-    g, n, m, channels = radiance.shape
-    # OpenBLAS starts threads of its own for products of 2^18 multiplications or more, which under our threads only wait for each
-    # other; a block of rays stays below.
-    products = np.matmul(basis.transpose(0, 2, 1), radiance.reshape(g, n, m * channels))
-    return products.reshape(g, -1, m, channels).transpose(0, 2, 1, 3)
+def gather(gatherer: Gatherer, items: list[Item], progress: Progress, label: str,
+           shares: Shares = USUAL) -> tuple[list[Traced], list[np.ndarray | None], list[Gathered]]:
+    """What the rays of ``items`` meet, the surface cache's texels there (None where nothing is reflected), and the items' sums once
+    the cache is solved. Raises Cancelled."""
+    cache, settings, threads = gatherer.cache, gatherer.settings, gatherer.context.threads
+    traced = parallel_for(lambda i: gatherer.trace(items[i]), len(items), threads, progress.span(0.0, shares.traced), label)
+    texels, ends = [None] * len(items), [None] * len(items)
+    if settings.bounces != 0:
+        walked = [hits.media.surface for hits in traced if hits.media is not None]
+        texels = cache.reach([hits.surface for hits in traced] + walked, progress.span(shares.traced, shares.grown), shares.texels)
+        texels, ends = texels[:len(items)], texels[len(items):] or ends
+        cache.solve(settings.bounces, SOLVER_SHARE * settings.target, progress.span(shares.grown, shares.solved))
+    gathered = parallel_for(lambda i: gatherer.shade(items[i], traced[i], texels[i], ends[i]), len(items), threads,
+                            progress.span(shares.solved, 1.0), label)
+    return traced, texels, gathered

@@ -1,7 +1,7 @@
 """The first bounce of lamps, gathered from reflective shadow maps.
 
 Paper: C. Dachsbacher and M. Stamminger, "Reflective Shadow Maps", I3D 2005. Each lamp is captured into maps of position, normal and
-reflected flux (`transport/reflective_shadow_map.py`); a receiver sums a few hundred of their texels (`gather.py`, with the
+reflected flux (`transport/views/reflective_shadow_map.py`); a receiver sums a few hundred of their texels (`gather.py`, with the
 formulas and what differs from the paper).
 
 What it is not: the light that it knows is one bounce of lamps. World, emissive surfaces and further bounces are not in it. The
@@ -17,11 +17,9 @@ since nothing is in the way; the dark one of the two rooms, where the exact answ
 
 import numpy as np
 
-from ...errors import BakeError
 from ...progress import Progress
 from ...scene import Scene
-from ...transport.context import LightContext
-from ..base import Checkpoint, Field, Technique, validate_settings
+from ..base import Checkpoint, Field, Technique, begin_bake
 from ..kernels import NUMPY, Kernels
 from .field import Capture
 from .settings import RsmSettings
@@ -44,13 +42,7 @@ class ReflectiveShadowMaps(Technique):
     def bake(self, scene: Scene, settings: RsmSettings, rng: np.random.Generator, progress: Progress, *,
              threads: int | None = None, checkpoint: Checkpoint | None = None, kernels: Kernels | None = None) -> Field:
         """See Technique.bake. ``kernels`` captures and gathers elsewhere than on the CPU."""
-        validate_settings(settings)
-        if not scene.volumes:
-            raise BakeError("the scene has no probe volume", "add a Light Probe Volume")
-        seed = int(rng.integers(1 << 32))
-        progress.stage("ray tracer")
-        progress.step(0.0, "building the ray tracer")
-        context = LightContext(scene, threads)
+        context, seed = begin_bake(scene, settings, rng, progress, threads)
         return Capture(context, settings, seed, kernels or NUMPY).field(progress)
 
     def sweep(self) -> tuple[RsmSettings, ...]:

@@ -21,22 +21,26 @@ from functools import cached_property
 import numpy as np
 
 from ...numerics import sh
-from ...numerics.sampling import hash_u32, r2
+from ...numerics.sampling import hash_u32, r2, unit_interval, wrapped
 from ...progress import Progress
-from ...transport.direct import SHORTENING
 from ...transport.parallel import CHUNK, chunks, parallel_for
-from ...transport.rays import SELF_INTERSECTION, offset_origins
-from ...transport.reflective_shadow_map import ReflectiveShadowMap
-from ...transport.vectors import luminance
+from ...transport.rays.tracer import attenuate, offset_origins, short_of
+from ...transport.vectors import dot, luminance
+from ...transport.views.reflective_shadow_map import ReflectiveShadowMap
 
+# Columns of a texel's row, of COLUMNS.
+POSITION, NORMAL, FLUX, AREA, DENSITY, COLUMNS = slice(0, 3), slice(3, 6), slice(6, 9), 9, 10, 12
 # Receivers × texels held at once: their temporaries stay in cache.
 PAIRS = CHUNK
+# What is added to the pattern's seed for the samples that follow the flux.
+_BY_FLUX = 1
 # Flux is quantized to integers of this many bits in all, so that float32 finds the very texel that the density belongs to.
 FLUX_BITS = 24
 # A texel seen at a slant reaches far; as a disk it is taken to be at most this many times as large as one seen head-on.
 MAX_SLANT = 10.0
-# Of a lamp's samples half go to its maps alike (one may lie right beside a receiver) and half by flux; no map gets fewer than this.
-MIN_SAMPLES = 4
+# Of a lamp's samples this share goes to its maps alike (one may lie right beside a receiver), the rest by flux; no map gets fewer
+# than so many.
+EVEN_SHARE, MIN_SAMPLES = 0.5, 4
 
 
 @dataclass(frozen=True)
@@ -52,8 +56,8 @@ class Pattern:
 class GatherMap:
     """A reflective shadow map as rows that a gather reads, with the density by which it samples them.
 
-    ``rows`` (texels, 12) float32: position 0:3, normal 3:6, flux/π 6:9, area/π 9, density over the unit square of samples that
-    follow the flux 10, and 0. ``cumulative`` (texels,) int64: running sum of the quantized flux, row by row; ``samples`` is this
+    ``rows`` (texels, 12) float32: POSITION, NORMAL, FLUX/π, AREA/π, DENSITY over the unit square of samples that follow the flux,
+    and 0. ``cumulative`` (texels,) int64: running sum of the quantized flux, row by row; ``samples`` is this
     map's part of its lamp's, which come after the ``first`` ones of the maps before it.
     """
 
@@ -61,21 +65,21 @@ class GatherMap:
         self.map, self.samples, self._first = shadow_map, samples, first
         self.view = shadow_map.view
         flux = shadow_map.flux.reshape(-1, 3)
-        self.rows = np.zeros((len(flux), 12), np.float32)
-        self.rows[:, 0:3] = shadow_map.position.reshape(-1, 3)
-        self.rows[:, 3:6] = shadow_map.normal.reshape(-1, 3)
-        self.rows[:, 6:9] = flux * np.float32(1.0 / np.pi)
-        self.rows[:, 9] = self._areas() * np.float32(1.0 / np.pi)
+        self.rows = np.zeros((len(flux), COLUMNS), np.float32)
+        self.rows[:, POSITION] = shadow_map.position.reshape(-1, 3)
+        self.rows[:, NORMAL] = shadow_map.normal.reshape(-1, 3)
+        self.rows[:, FLUX] = flux * np.float32(1.0 / np.pi)
+        self.rows[:, AREA] = self._areas() * np.float32(1.0 / np.pi)
         strength = luminance(flux).astype(np.float64)
         lit = strength > 0
         quantized = np.where(lit, np.floor(strength / strength.sum() * (2**FLUX_BITS - lit.sum())) + 1, 0).astype(np.int64)
         self.cumulative = np.cumsum(quantized)
-        self.rows[:, 10] = quantized * (len(flux) / self.cumulative[-1])
+        self.rows[:, DENSITY] = quantized * (len(flux) / self.cumulative[-1])
 
     @cached_property
     def lit(self) -> np.ndarray:
         """The rows whose flux is not zero."""
-        return self.rows[np.any(self.rows[:, 6:9] > 0, axis=1)]
+        return self.rows[np.any(self.rows[:, FLUX] > 0, axis=1)]
 
     def places(self, pattern: Pattern) -> tuple[np.ndarray, np.ndarray]:
         """This map's points of the pattern (see ``places``)."""
@@ -95,19 +99,19 @@ class GatherMap:
         row = np.searchsorted(last, target, side="right")
         low = np.where(row > 0, last[row - 1], 0)
         total = last[row] - low
-        v = row + (target - low) / total
+        y = row + (target - low) / total
         target = low + across.astype(np.float64) * total
         index = np.searchsorted(self.cumulative, target, side="right")
         low = np.where(index > 0, self.cumulative[index - 1], 0)
-        u = index - row * size + (target - low) / (self.cumulative[index] - low)
-        return index, ((u / size).astype(np.float32), (v / size).astype(np.float32))
+        x = index - row * size + (target - low) / (self.cumulative[index] - low)
+        return index, ((x / size).astype(np.float32), (y / size).astype(np.float32))
 
     def _areas(self) -> np.ndarray:
         """Surface (texels,) [m²] that each texel covers."""
-        offset = self.rows[:, 0:3].astype(np.float64) - self.view.position_world
+        offset = self.rows[:, POSITION].astype(np.float64) - self.view.position_world
         measure = self.view.texel_measure().ravel()
         head_on = measure if self.view.orthographic else measure * np.sum(offset**2, axis=1)
-        cosine = np.abs(np.sum(self.view.directions() * self.rows[:, 3:6], axis=1))
+        cosine = np.abs(np.sum(self.view.directions() * self.rows[:, NORMAL], axis=1))
         return head_on / np.maximum(cosine, 1.0 / MAX_SLANT)
 
 
@@ -118,7 +122,7 @@ def places(pattern: Pattern, samples: int, first: int) -> tuple[np.ndarray, np.n
     the others before it have taken.
     """
     in_disk = round(samples * pattern.disk_share)
-    return r2(in_disk, pattern.seed, first), r2(samples - in_disk, pattern.seed + 1, first)
+    return r2(in_disk, pattern.seed, first), r2(samples - in_disk, pattern.seed + _BY_FLUX, first)
 
 
 def shared_samples(strength: np.ndarray, lamp: np.ndarray, samples: int,
@@ -127,9 +131,9 @@ def shared_samples(strength: np.ndarray, lamp: np.ndarray, samples: int,
     and how many those before them have taken."""
     if not len(strength):
         return [], []
-    share = 0.5 / np.maximum(np.bincount(lamp)[lamp], 1) + 0.5 * strength / np.bincount(lamp, strength)[lamp]
-    counts = [max(least, round(samples * part)) for part in share]
-    before = [sum(count for other, count in zip(lamp[:i], counts, strict=False) if other == own) for i, own in enumerate(lamp)]
+    share = EVEN_SHARE / np.maximum(np.bincount(lamp)[lamp], 1) + (1.0 - EVEN_SHARE) * strength / np.bincount(lamp, strength)[lamp]
+    counts = [max(least, round(samples * of_map)) for of_map in share]
+    before = [sum(count for other, count in zip(lamp[:i], counts, strict=False) if other == same) for i, same in enumerate(lamp)]
     return counts, before
 
 
@@ -150,8 +154,7 @@ def gather(maps: tuple[GatherMap, ...], points: np.ndarray, normals: np.ndarray,
     Without a ``tracer`` nothing is in the way, as in the paper; with one a shadow ray decides for every sample.
     """
     def estimate(rows):
-        x, n = points[rows], normals[rows]
-        return sum(_irradiance(*_sample(item, x, pattern), x, n, tracer) for item in maps)
+        return sum(_irradiance(*_sample(item, points[rows], pattern), points[rows], normals[rows], tracer) for item in maps)
 
     points, normals = (np.ascontiguousarray(part, np.float32) for part in (points, normals))
     return _over_receivers(estimate, maps, len(points), 1, max((item.samples for item in maps), default=1), threads)[:, 0]
@@ -164,8 +167,7 @@ def gather_sh(maps: tuple[GatherMap, ...], points: np.ndarray, order: int, patte
     ``progress`` is asked for the wish to stop only: raises Cancelled.
     """
     def estimate(rows):
-        x = points[rows]
-        return sum(_projection(*_sample(item, x, pattern), x, order, tracer) for item in maps)
+        return sum(_projection(*_sample(item, points[rows], pattern), points[rows], order, tracer) for item in maps)
 
     points = np.ascontiguousarray(points, np.float32)
     most = max((item.samples for item in maps), default=1)
@@ -179,13 +181,13 @@ def gather_every_texel(maps: tuple[GatherMap, ...], points: np.ndarray, normals:
     ``progress`` is asked for the wish to stop only: raises Cancelled.
     """
     def estimate(rows):
-        x, total = points[rows], 0
+        total = 0
         for item in maps:
             for span in chunks(len(item.lit), PAIRS):
                 texels = item.lit[span][None]
                 weight = np.ones((1, texels.shape[1]), np.float32)
-                total = total + (_projection(texels, weight, x, order, tracer) if normals is None
-                                 else _irradiance(texels, weight, x, normals[rows], tracer))
+                total = total + (_projection(texels, weight, points[rows], order, tracer) if normals is None
+                                 else _irradiance(texels, weight, points[rows], normals[rows], tracer))
         return total
 
     points = np.ascontiguousarray(points, np.float32)
@@ -204,7 +206,7 @@ def rotations(points: np.ndarray, seed: int) -> np.ndarray:
     # Adding zero makes −0 the same place as 0.
     bits = (np.ascontiguousarray(points, np.float32) + np.float32(0.0)).view(np.uint32)
     state = hash_u32(seed, bits[:, 0], bits[:, 1], bits[:, 2])
-    return np.stack([hash_u32(state, d) >> np.uint32(8) for d in range(2)], axis=-1).astype(np.float32) * np.float32(2.0**-24)
+    return unit_interval(np.stack([hash_u32(state, d) for d in range(2)], axis=-1))
 
 
 def _over_receivers(estimate, maps, count: int, width: int, pairs: int, threads, progress: Progress | None = None) -> np.ndarray:
@@ -233,7 +235,7 @@ def _sample(item: GatherMap, points: np.ndarray, pattern: Pattern) -> tuple[np.n
         xi = _turned(disk_xi, shift)
         angle, reach = xi[1] * np.float32(2.0 * np.pi), radius * xi[0] * np.sqrt(xi[0])
         place = centre[:, :1] + reach * np.cos(angle), centre[:, 1:] + reach * np.sin(angle)
-        column, row = (np.floor(part * size).astype(np.int32) for part in place)
+        column, row = (np.floor(coordinate * size).astype(np.int32) for coordinate in place)
         # Negative numbers are large as unsigned ones.
         inside = (column.view(np.uint32) < size) & (row.view(np.uint32) < size)
         places.append(place)
@@ -243,60 +245,60 @@ def _sample(item: GatherMap, points: np.ndarray, pattern: Pattern) -> tuple[np.n
         places.append(place)
         indices.append(index)
     index = np.concatenate(indices, axis=1)
-    x, y = (np.concatenate(parts, axis=1) - middle for parts, middle in zip(zip(*places, strict=True), np.hsplit(centre, 2),
-                                                                           strict=True))
+    across, up = (np.concatenate(parts, axis=1) - middle for parts, middle in zip(zip(*places, strict=True), np.hsplit(centre, 2),
+                                                                                strict=True))
     texels = np.take(item.rows, np.maximum(index, 0), axis=0)
-    squared = (x * x + y * y) / (radius * radius)
+    squared = (across * across + up * up) / (radius * radius)
     disk = (squared < 1) * np.maximum(squared, np.float32(1e-12)) ** np.float32(-2.0 / 3.0)
-    density = disk * np.float32(in_disk / (3.0 * np.pi * pattern.disk_radius**2)) + texels[..., 10] * np.float32(by_flux)
+    density = disk * np.float32(in_disk / (3.0 * np.pi * pattern.disk_radius**2)) + texels[..., DENSITY] * np.float32(by_flux)
     return texels, ((index >= 0) & (density > 0)) * (np.float32(size * size) / np.maximum(density, np.float32(1e-30)))
 
 
 def _turned(places: np.ndarray, shift: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Both coordinates (n, s) of the pattern's points (s, 2) after each receiver's ``shift`` (n, 2) on the torus."""
-    return tuple(sums - np.floor(sums) for sums in (places[None, :, d] + shift[:, d, None] for d in range(2)))
+    return tuple(wrapped(places[None, :, axis] + shift[:, axis, None]) for axis in range(2))
 
 
 def _arrival(texels, points):
     """Unit directions (n, s, 3) from receivers (n, 3) to ``texels`` (n or 1, s, 12), distances (n, s), and irradiance (n, s) on a
     facing plane per flux/π."""
-    towards = texels[..., 0:3] - points[:, None]
-    squared = towards[..., 0] ** 2 + towards[..., 1] ** 2 + towards[..., 2] ** 2
+    towards = texels[..., POSITION] - points[:, None]
+    squared = dot(towards, towards)
     distance = np.sqrt(np.maximum(squared, np.finfo(np.float32).tiny))
     direction = towards / distance[..., None]
-    normal = texels[..., 3:6]
-    leaving = -(normal[..., 0] * direction[..., 0] + normal[..., 1] * direction[..., 1] + normal[..., 2] * direction[..., 2])
+    leaving = -dot(texels[..., NORMAL], direction)
     # A texel right at the receiver, or one with nothing in it, has no area to be regular by.
-    return direction, distance, np.maximum(leaving, 0.0) / np.maximum(squared + texels[..., 9], np.float32(1e-20))
+    return direction, distance, np.maximum(leaving, 0.0) / np.maximum(squared + texels[..., AREA], np.float32(1e-20))
 
 
 def _irradiance(texels, weight, points, normals, tracer) -> np.ndarray:
     """(n, 1, 3) from ``texels`` (n or 1, s, 12), each counted ``weight`` times."""
     direction, distance, strength = _arrival(texels, points)
-    n = normals[:, None]
-    cosine = n[..., 0] * direction[..., 0] + n[..., 1] * direction[..., 1] + n[..., 2] * direction[..., 2]
+    cosine = dot(normals[:, None], direction)
     strength = strength * np.maximum(cosine, 0.0) * weight
+    tint = None
     if tracer is not None:
-        _shadow(strength, texels, offset_origins(points, normals, normals), direction, distance, tracer)
-    return np.stack([(strength * texels[..., 6 + channel]).sum(axis=1) for channel in range(3)], axis=-1)[:, None]
+        tint = _shadow(strength, texels, offset_origins(points, normals, normals), direction, distance, tracer)
+    flux = texels[..., FLUX] if tint is None else texels[..., FLUX] * tint
+    return np.stack([(strength * flux[..., channel]).sum(axis=1) for channel in range(3)], axis=-1)[:, None]
 
 
 def _projection(texels, weight, points, order, tracer) -> np.ndarray:
     """(n, (order + 1)², 3): radiance from ``texels`` (n or 1, s, 12) as SH, each counted ``weight`` times."""
     direction, distance, strength = _arrival(texels, points)
     strength = strength * weight
+    tint = None
     if tracer is not None:
-        _shadow(strength, texels, points, direction, distance, tracer)
+        tint = _shadow(strength, texels, points, direction, distance, tracer)
     basis = sh.evaluate(direction, order)
-    return np.matmul(basis.swapaxes(1, 2), strength[..., None] * texels[..., 6:9])
+    coloured = strength[..., None] * texels[..., FLUX]
+    return np.matmul(basis.swapaxes(1, 2), coloured if tint is None else coloured * tint)
 
 
-def _shadow(strength, texels, origins, direction, distance, tracer) -> None:
-    """Set ``strength`` (n, s) to 0 where something lies between receivers and texels."""
+def _shadow(strength, texels, origins, direction, distance, tracer) -> np.ndarray | None:
+    """Multiply ``strength`` (n, s) by what passes between receivers and texels; where that is coloured, return it (n, s, 3)."""
     receiver, sample = np.nonzero(strength > 0)
     origins, direction = origins[receiver], direction[receiver, sample]
-    targets = texels[receiver if len(texels) > 1 else 0, sample, 0:3]
-    reach = np.maximum(np.abs(targets).max(axis=1), np.abs(origins).max(axis=1))
-    limits = np.maximum(distance[receiver, sample] * (1 - SHORTENING) - 4 * SELF_INTERSECTION * reach, 0.0)
-    blocked = tracer.occluded(origins, direction, limits)
-    strength[receiver[blocked], sample[blocked]] = 0.0
+    targets = texels[receiver if len(texels) > 1 else 0, sample, POSITION]
+    passed = tracer.transmittance(origins, direction, short_of(distance[receiver, sample], origins, targets))
+    return attenuate(strength, (receiver, sample), passed)

@@ -22,3 +22,8 @@ class RsmSettings:
                                 "paper's pattern, which misses what lies outside the disk", "", 0.0, 1.0)
     area_points: int = setting(4, "Points per Area Lamp", "From how many points an area lamp is captured", "", 1, 64)
     focus: float = setting(3.0, "Sun Focus", "A sun's map covers this many times the box around all volumes", "", 1.0, 1000.0)
+
+    @property
+    def live(self) -> bool:
+        """Whether the preview makes this light of what it draws, without a bake: not where shadow rays are to be traced."""
+        return not self.visibility

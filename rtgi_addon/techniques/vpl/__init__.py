@@ -18,18 +18,20 @@ square root of the number of lights.
 
 import numpy as np
 
-from ...errors import BakeError
 from ...progress import Progress
 from ...scene import Scene
 from ...transport.context import LightContext
 from ...transport.vectors import luminance
-from ..base import Checkpoint, Field, Technique, validate_settings
+from ..base import Checkpoint, Field, Technique, begin_bake
 from ..kernels import Kernels
-from ..probes.bake import focus
+from ..lattice.focus import focus
 from .field import VplField, require_lights
 from .gather import gather
 from .sampling import LightSet, sample_lights
 from .settings import VplSettings
+
+# How far a bake is when the ray tracer is built, and when the virtual lights are chosen.
+_READY, _LIGHTS_KEPT = 0.02, 0.2
 
 
 class VirtualPointLights(Technique):
@@ -46,24 +48,18 @@ class VirtualPointLights(Technique):
     def bake(self, scene: Scene, settings: VplSettings, rng: np.random.Generator, progress: Progress, *,
              threads: int | None = None, checkpoint: Checkpoint | None = None, kernels: Kernels | None = None) -> Field:
         """See Technique.bake. ``kernels`` take over the gather at surface points. Raises BakeError if no virtual light survives."""
-        validate_settings(settings)
-        if not scene.volumes:
-            raise BakeError("the scene has no probe volume", "add a Light Probe Volume")
-        seed = int(rng.integers(1 << 32))
-        progress.stage("ray tracer")
-        progress.step(0.0, "building the ray tracer")
-        context = LightContext(scene, threads)
+        context, seed = begin_bake(scene, settings, rng, progress, threads)
         progress.stage("virtual lights")
-        lights = sample_lights(context, scene.volumes, settings, seed, focus(scene.volumes), progress.span(0.02, 0.2))
+        lights = sample_lights(context, scene.volumes, settings, seed, focus(scene.volumes), progress.span(_READY, _LIGHTS_KEPT))
         natural = mean_bound(context, lights)
-        clamp = _own_bound(natural, settings) if settings.clamp is None else settings.clamp or None
+        clamp = _chosen_bound(natural, settings) if settings.clamp is None else settings.clamp or None
         field = VplField(context, lights, settings, seed, clamp, natural, kernels=kernels)
         require_lights(field)
         if clamp is not None:
             field.stats["clamp_loss"] = clamp_loss(context, lights, clamp)
         progress.stage("probes")
         probes = sum(int(np.prod(volume.resolution)) for volume in scene.volumes)
-        field.grids(progress.span(0.2, 1.0))
+        field.grids(progress.span(_LIGHTS_KEPT, 1.0))
         field.stats["rays"] = probes * (field.lights.count + field.lights.distant_count)
         return field
 
@@ -77,7 +73,7 @@ class VirtualPointLights(Technique):
 COMPENSATED_SHARE = 0.1
 
 
-def _own_bound(natural: float | None, settings: VplSettings) -> float | None:
+def _chosen_bound(natural: float | None, settings: VplSettings) -> float | None:
     return natural if natural is None or not settings.compensation else COMPENSATED_SHARE * natural
 
 

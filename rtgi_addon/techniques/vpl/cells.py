@@ -5,11 +5,14 @@ from itertools import product
 import numpy as np
 
 from ...transport.parallel import chunks
+from ...transport.vectors import dot
 
 # Points that a cell of the search grid is to hold, about.
 _OCCUPANCY = 2.0
 # Cells of the search grid along its longest side.
 _MAX_SIDE = 96
+# Distances that are held at once where samples are far from every point.
+_PAIRS = 1 << 20
 _AROUND = list(product((-1, 0, 1), repeat=3))
 
 
@@ -71,15 +74,14 @@ def nearest(samples: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.nda
             rows = rows[count[cell[rows]] > turn]
     # Farther than a cell away there may be a nearer one beyond those that were looked at.
     rows = np.flatnonzero(squared > np.float32(width * width))
-    for span in chunks(len(rows), max(1, (1 << 20) // len(points))):
-        part = rows[span]
-        distance = sum(np.square(samples[part, axis, None] - points[:, axis]) for axis in range(3))
-        owner[part] = distance.argmin(axis=1)
-        squared[part] = distance[np.arange(len(part)), owner[part]]
+    for span in chunks(len(rows), max(1, _PAIRS // len(points))):
+        far = rows[span]
+        distance = sum(np.square(samples[far, axis, None] - points[:, axis]) for axis in range(3))
+        owner[far] = distance.argmin(axis=1)
+        squared[far] = distance[np.arange(len(far)), owner[far]]
     return owner, squared
 
 
 def _squared(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Squared distances (k,) of points ``a`` (k, 3) from ``b`` (k, 3) or (3,)."""
-    difference = a - b
-    return (difference[:, 0] * difference[:, 0] + difference[:, 1] * difference[:, 1] + difference[:, 2] * difference[:, 2])
+    return dot(a - b, a - b)

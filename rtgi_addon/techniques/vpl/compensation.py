@@ -8,17 +8,20 @@ The radiance found at their ends is emission plus what lamps and a subset of the
 too, so that none of its lights gives more than the mean irradiance, and what this takes away is not looked for again.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...numerics import sh
-from ...numerics.sampling import cosine_hemisphere, frame, hash_u32, sobol_owen_at, sphere_from_square
+from ...numerics.sampling import about, cosine_hemisphere, hash_u32, sobol_owen_at, sphere_from_square, unit_interval
 from ...transport.context import LightContext
-from ...transport.direct import lamp_irradiance
 from ...transport.parallel import CHUNK, chunks, parallel_for
-from ...transport.rays import offset_origins
+from ...transport.paths.direct import Receiver, lamp_irradiance
+from ...transport.paths.wavefront import Vertices
+from ...transport.rays.tracer import offset_origins
 from ...transport.vectors import dot, normalized
-from ...transport.virtual_lights import VirtualLights
 from .gather import gather
+from .virtual_lights import VirtualLights
 
 # Virtual lights asked about the light at a ray's end, and how many different subsets of them there are.
 SUBSET, SUBSETS = 512, 8
@@ -38,12 +41,11 @@ class Compensation:
         stride = max(1, again.count // SUBSET)
         self._subsets, self._subset_clamp = [], []
         for offset in range(min(stride, SUBSETS)):
-            part = again.take(slice(offset * stride // min(stride, SUBSETS), None, stride))
-            gain = np.float32(max(again.count, 1) / max(part.count, 1))
+            subset = again.take(slice(offset * stride // min(stride, SUBSETS), None, stride))
+            gain = np.float32(max(again.count, 1) / max(subset.count, 1))
             # Fewer, brighter lights have larger bright spots.
             self._subset_clamp.append(None if natural is None else natural / float(gain))
-            self._subsets.append(VirtualLights(part.positions, part.normals, part.flux * gain, part.source, part.bounce, part.path,
-                                               part.directions, part.irradiance))
+            self._subsets.append(replace(subset, flux=subset.flux * gain))
 
     def irradiance(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """What ``gather`` with this clamp lacks: (n, 3) float32."""
@@ -52,12 +54,10 @@ class Compensation:
 
         def directions(rows, u):
             local = cosine_hemisphere(u)
-            tangent, bitangent = frame(normals[rows])
-            along = normalized(tangent * local[:, :1] + bitangent * local[:, 1:2] + normals[rows] * local[:, 2:])
-            return along, np.maximum(local[:, 2], 0)
+            return normalized(about(normals[rows], local)), np.maximum(local[:, 2], 0)
 
-        def total(found, _along, values, count):
-            sums = np.stack([np.bincount(found, values[:, c], count) for c in range(3)], axis=1)
+        def total(receivers, _along, values, count):
+            sums = np.stack([np.bincount(receivers, values[:, channel], count) for channel in range(3)], axis=1)
             return sums * (np.pi / self._rays)
 
         return self._sampled(origins, directions, total, (3,))
@@ -67,10 +67,10 @@ class Compensation:
         def directions(rows, u):
             return sphere_from_square(u), np.ones(len(u), np.float32)
 
-        def total(found, along, values, count):
+        def total(receivers, along, values, count):
             products = sh.evaluate(along, order)[:, :, None] * values[:, None]
             result = np.zeros((count, *products.shape[1:]))
-            np.add.at(result, found, products)
+            np.add.at(result, receivers, products)
             return result * (4.0 * np.pi / self._rays)
 
         return self._sampled(np.ascontiguousarray(points, np.float32), directions, total, (sh.coefficient_count(order), 3))
@@ -87,39 +87,53 @@ class Compensation:
             index = np.tile(np.arange(self._rays), count)
             along, cosine = directions(rows, sobol_owen_at(index, 2, hash_u32(self._seed, rows)))
             hits = self._context.tracer.intersect(origins[rows], along, np.sqrt(cosine / self._clamp))
-            found = np.flatnonzero(hits.primitive >= 0)
-            if found.size == 0:
+            close = np.flatnonzero(hits.primitive >= 0)
+            if close.size == 0:
                 return
-            primitive = hits.primitive[found]
-            facing = np.abs(dot(self._context.geometry.normals_world[primitive], along[found]))
-            geometry_term = cosine[found] * facing / np.maximum(hits.t[found] ** 2, np.float32(1e-30))
+            primitive = hits.primitive[close]
+            facing = np.abs(dot(self._context.geometry.normals_world[primitive], along[close]))
+            geometry_term = cosine[close] * facing / np.maximum(hits.t[close] ** 2, np.float32(1e-30))
             residual = 1.0 - self._clamp / np.maximum(geometry_term, np.float32(1e-30))
             cut = np.flatnonzero(residual > 0)
-            found, residual = found[cut], residual[cut]
-            radiance = self._radiance(primitive[cut], hits.u[found], hits.v[found], hits.t[found], along[found], rows[found])
-            result[span] = total(rows[found] - span.start, along[found], radiance * residual[:, None], count)
+            close, residual = close[cut], residual[cut]
+            met = Vertices(primitive[cut], hits.u[close], hits.v[close], hits.t[close], along[close])
+            radiance = self._radiance(met, rows[close])
+            if hits.tint is not None:
+                radiance = radiance * hits.tint[close]
+            result[span] = total(rows[close] - span.start, along[close], radiance * residual[:, None], count)
 
         parallel_for(work, len(spans), self._context.threads)
         return result
 
-    def _radiance(self, primitive, u, v, t, along, rows) -> np.ndarray:
-        """Radiance (h, 3) that leaves the hits against the rays."""
-        context = self._context
-        surfaces, normals = context.surfaces, context.geometry.normals_world[primitive]
-        radiance = surfaces.emission(primitive, u, v) if surfaces.has_emission else np.zeros((len(primitive), 3), np.float32)
+    def _radiance(self, met: Vertices, rows: np.ndarray) -> np.ndarray:
+        """Radiance (h, 3) that leaves where the rays of receivers ``rows`` (h,) ``met`` surfaces, against them."""
+        context, surfaces, primitive = self._context, self._context.surfaces, met.primitive
+        cosine = met.cosine(context)
+        radiance = np.zeros((len(primitive), 3), np.float32)
+        if surfaces.has_emission:
+            radiance = surfaces.emission(primitive, met.u, met.v, cosine)
         if self._bounces == 0 or len(primitive) == 0:
             return radiance
-        side = -np.copysign(np.float32(1.0), dot(normals, along))[:, None]
-        geometric, shading = normals * side, surfaces.shading_normal(primitive, u, v) * side
-        points = offset_origins(context.geometry.points(primitive, u, v), geometric, geometric, t)
-        irradiance = np.zeros((len(points), 3), np.float32)
+        scattered = surfaces.albedo(primitive, met.u, met.v, cosine) * self._irradiance(*met.facing(context), primitive, rows)
+        if surfaces.has_translucency:
+            chosen = np.flatnonzero(surfaces.translucent[context.geometry.material[primitive]])
+            through = met.take(chosen)
+            passed = surfaces.translucency(through.primitive, through.u, through.v, cosine[chosen])
+            behind = through.facing(context, np.ones(len(chosen), bool))
+            scattered[chosen] += passed * self._irradiance(*behind, through.primitive, rows[chosen])
+        return radiance + scattered * np.float32(1.0 / np.pi)
+
+    def _irradiance(self, points: np.ndarray, geometric: np.ndarray, shading: np.ndarray, primitive: np.ndarray,
+                    rows: np.ndarray) -> np.ndarray:
+        """Irradiance (h, 3) at ``points`` (h, 3) on triangles ``primitive`` (h,) with two normals, found by rays of the receivers
+        ``rows`` (h,)."""
+        context, irradiance = self._context, np.zeros((len(points), 3), np.float32)
         if context.lamps.count:
             numbers = np.stack([hash_u32(self._seed, rows, np.arange(len(rows)), d) for d in range(3)], axis=1)
-            irradiance += lamp_irradiance(context, points, geometric, shading,
-                                          (numbers >> np.uint32(8)).astype(np.float32) * np.float32(2.0**-24))
+            irradiance += lamp_irradiance(context, points, Receiver(shading, geometric, primitive), unit_interval(numbers))
         for number, lights in enumerate(self._subsets):
             chosen = np.flatnonzero(rows % len(self._subsets) == number)
             if chosen.size:
                 irradiance[chosen] += gather(context, lights, points[chosen], shading[chosen], clamp=self._subset_clamp[number],
                                              threads=1)
-        return radiance + surfaces.albedo(primitive, u, v) * irradiance * np.float32(1.0 / np.pi)
+        return irradiance

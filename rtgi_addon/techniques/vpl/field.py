@@ -1,21 +1,20 @@
 """``VplField``: irradiance anywhere from virtual lights and shadow rays."""
 
 from dataclasses import asdict
+from functools import partial
 
 import numpy as np
 
 from ...errors import BakeError
-from ...numerics import sh
-from ...numerics.sampling import hash_u32, sobol_owen
 from ...progress import Progress
 from ...scene import Scene
 from ...transport.context import LightContext
 from ...transport.parallel import chunks
-from ...transport.rays import offset_origins
-from ...transport.sources import Sources
-from ..base import Field, ProbeGrid
+from ...transport.rays.tracer import offset_origins
+from ..base import Field, ProbeGrid, all_captured
 from ..kernels import NUMPY, Kernels
-from ..resample import resample
+from ..lamp_light import LampLight
+from ..lattice.resample import resample
 from .compensation import Compensation
 from .gather import gather, gather_sh, visibility
 from .incremental import follow
@@ -41,7 +40,9 @@ class VplField(Field):
         self._natural = natural
         self._kernels = kernels or NUMPY
         self.lights = lights.lights()
-        self.includes_direct = settings.direct
+        self._lamp_light = LampLight(context, settings.direct, LAMP_SAMPLES, seed)
+        self.direct_lamps = self._lamp_light.names
+        self.omissions = all_captured("vpl", context.scene.volumes)
         self.params = asdict(settings)
         self.stats = {"lights": self.lights.count, "distant_lights": self.lights.distant_count, "paths": lights.paths.count}
         if clamp is not None:
@@ -61,24 +62,25 @@ class VplField(Field):
         """See Field. Every receiver casts a shadow ray to every virtual light that faces it."""
         points, normals = np.asarray(points, np.float32), np.asarray(normals, np.float32)
         context = self.context
-        if self._kernels is NUMPY:
+        # A kernel knows which lights are seen, not through which colours.
+        if self._kernels is NUMPY or context.surfaces.has_tint:
             result = gather(context, self.lights, points, normals, clamp=self.clamp, threads=context.threads)
         else:
             result = self._by_kernel(points, normals)
         if self._compensation is not None:
             result += self._compensation.irradiance(points, normals)
-        if self._settings.direct:
-            result += self._direct(points, normals)
+        if self._lamp_light:
+            result += self._lamp_light.irradiance(points, normals)
         return result
 
-    def radiance_sh(self, points: np.ndarray) -> np.ndarray:
-        """SH coefficients (n, (order + 1)², 3) float32 of what arrives at free ``points`` (n, 3)."""
-        context, settings = self.context, self._settings
-        result = gather_sh(context, self.lights, points, settings.order, clamp=self.clamp, threads=context.threads)
+    def radiance_sh(self, points: np.ndarray, order: int = 2) -> np.ndarray:
+        """See Field; any ``order``."""
+        points, context = np.asarray(points, np.float32), self.context
+        result = gather_sh(context, self.lights, points, order, clamp=self.clamp, threads=context.threads)
         if self._compensation is not None:
-            result += self._compensation.coefficients(points, settings.order)
-        if settings.direct:
-            result += self._direct_sh(points)
+            result += self._compensation.coefficients(points, order)
+        if self._lamp_light:
+            result += self._lamp_light.coefficients(points, order)
         return result
 
     def arrays(self) -> dict[str, np.ndarray]:
@@ -90,7 +92,8 @@ class VplField(Field):
         if self._grids is None:
             context = self.context
             self._grids = resample(self, context, context.scene.volumes, self._settings.order, progress or Progress(),
-                                   seed=self._seed, threads=context.threads, radiance_sh=self.radiance_sh)
+                                   seed=self._seed, threads=context.threads,
+                                   radiance_sh=partial(self.radiance_sh, order=self._settings.order))
         return self._grids
 
     def relight(self, scene: Scene, progress: Progress | None = None) -> "VplField":
@@ -115,28 +118,6 @@ class VplField(Field):
         for span in chunks(len(points), max(1, MAX_VISIBILITIES // max(lights.count, 1))):
             seen = visibility(context, lights, points[span], normals[span])
             result[span] += self._kernels.vpl_gather(lights, origins[span], normals[span], seen, self.clamp)
-        return result
-
-    def _lamp_samples(self):
-        """(sources, lamp, number of samples, (2,) numbers) of every sample of every lamp."""
-        sources = Sources(self.context)
-        for lamp in range(self.context.lamps.count):
-            count = 1 if sources.is_delta[lamp] else LAMP_SAMPLES
-            for numbers in sobol_owen(count, 2, hash_u32(self._seed, lamp, 6)):
-                yield sources, lamp, np.float32(count), numbers
-
-    def _direct(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
-        result, reach = np.zeros((len(points), 3), np.float32), np.zeros(len(points), np.float32)
-        for sources, lamp, count, numbers in self._lamp_samples():
-            result += sources.irradiance(lamp, points, normals, normals, reach, np.tile(numbers, (len(points), 1))) / count
-        return result
-
-    def _direct_sh(self, points: np.ndarray) -> np.ndarray:
-        order = self._settings.order
-        result = np.zeros((len(points), sh.coefficient_count(order), 3), np.float32)
-        for sources, lamp, count, numbers in self._lamp_samples():
-            directions, irradiance = sources.facing_irradiance(lamp, points, np.tile(numbers, (len(points), 1)))
-            result += sh.evaluate(directions, order)[:, :, None] * (irradiance / count)[:, None, :]
         return result
 
 

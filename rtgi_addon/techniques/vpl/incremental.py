@@ -15,11 +15,13 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from ...numerics.sampling import hash_u32, sobol_owen_at
-from ...scene import AreaLight, Light
-from ...transport.context import LightContext
-from ...transport.light_emission import Emission, connect, emit, near_gain
-from ...transport.light_paths import FROM_WORLD, LightPaths, join, shading_gain, trace
-from ...transport.path_numbers import PathNumbers
+from ...scene import Light
+from ...transport.context import LightContext, same_values
+from ...transport.lights.kind import Emission
+from ...transport.lights.kinds import kind_of
+from ...transport.lights.shaped import arriving_share, connect, emit
+from ...transport.paths.from_lights import FROM_WORLD, LightPaths, join, meets_all, shading_gain, trace
+from ...transport.paths.numbers import PathNumbers
 from ...transport.vectors import dot, luminance
 from .cells import Cells
 from .sampling import LightSet, added_paths, distant_lights, path_count, paths_per_source, source_paths
@@ -30,6 +32,8 @@ SAMPLES = 8
 CROWDED, GIVEN_UP = 0.4, 0.03
 # With fewer valid paths than this share the lamp has jumped: it is sampled afresh.
 FRESH_BELOW = 0.5
+# Tells the rays that count a lamp's power apart from all other numbers of a seed: the letters in.
+_COUNTED = 0x696E
 
 
 @dataclass(frozen=True)
@@ -48,7 +52,7 @@ class Change:
 def follow(lights: LightSet, before: LightContext, after: LightContext, settings, seed: int) -> tuple[LightSet, Change]:
     """``lights`` of the scene ``before`` under the lamps and world of ``after``."""
     paths, generation = lights.paths, lights.generation + 1
-    own_seed = int(hash_u32(seed, generation))
+    new_seed = int(hash_u32(seed, generation))
     old, new = before.scene.lights, after.scene.lights
     same_world = after.environment is before.environment
     kept = np.ones(paths.count, bool)
@@ -64,12 +68,12 @@ def follow(lights: LightSet, before: LightContext, after: LightContext, settings
         if ratio is not None:
             power[rows] *= ratio
             continue
-        if there_before and _can_follow(old[lamp], new[lamp]):
+        if there_before and _can_follow(old[lamp], new[lamp]) and meets_all(after, new[lamp], lamp):
             moved = _follow_lamp(lights, rows, after, lamp, settings.bounces, seed)
         if moved is None:
             kept[rows] = False
             if lamp in fresh:
-                added.append(source_paths(after, lamp, rows.size or fresh[lamp], lights.beam, settings.bounces, own_seed))
+                added.append(source_paths(after, lamp, rows.size or fresh[lamp], lights.beam, settings.bounces, new_seed))
             continue
         stay, power_of_rows, new_paths = moved
         kept[rows[~stay]] = False
@@ -79,12 +83,12 @@ def follow(lights: LightSet, before: LightContext, after: LightContext, settings
         rows = np.flatnonzero(paths.source == FROM_WORLD)
         kept[rows] = False
         if FROM_WORLD in fresh:
-            added.append(source_paths(after, FROM_WORLD, fresh[FROM_WORLD], lights.beam, settings.bounces, own_seed))
+            added.append(source_paths(after, FROM_WORLD, fresh[FROM_WORLD], lights.beam, settings.bounces, new_seed))
     old_paths = replace(paths, power=power).take_paths(np.flatnonzero(kept))
-    parts = [old_paths, *(added_paths(after, lights, part, own_seed) for part in added)]
+    parts = [old_paths, *(added_paths(after, lights, part, new_seed) for part in added)]
     result = replace(lights, paths=join(parts), generation=generation)
     if not same_world:
-        directions, irradiance = distant_lights(after, lights.pilots, settings.lights, own_seed)
+        directions, irradiance = distant_lights(after, lights.pilots, settings.lights, new_seed)
         result = replace(result, directions=directions, irradiance=irradiance)
     return result, Change(int(result.paths.met.sum()), int(sum(part.met.sum() for part in added)))
 
@@ -97,15 +101,16 @@ def _follow_lamp(lights: LightSet, rows: np.ndarray, context: LightContext, lamp
     origins, directions, domain, valid = connect(light, first, paths.u[rows], beam)
     valid = valid & (~met | (dot(normals, directions) < 0))
     candidates = np.flatnonzero(valid)
-    blocked = context.tracer.occluded(origins[candidates], first[candidates] - origins[candidates], np.float32(1.0))
-    valid[candidates[blocked]] = False
+    passed = context.lamp_transmittance(context.lamps.is_delta[lamp], origins[candidates], first[candidates] - origins[candidates],
+                                        np.ones(len(candidates), np.float32))
+    valid[candidates[~passed.any(axis=1)]] = False
     if valid.sum() < FRESH_BELOW * len(rows):
         return None
     # Rays that the lamp would emit now tell each path's share of its power: the same ones after every change, or it would flicker.
     index = np.arange(SAMPLES * len(rows))
-    key = hash_u32(seed, lamp, 0x696E)
+    key = hash_u32(seed, lamp, _COUNTED)
     u = sobol_owen_at(index, 4, key)
-    emission = emit(light, u, beam)
+    emission, u = emit(light, u, beam)
     cells = Cells(emission.domain, domain[valid])
     brightness = luminance(emission.power)
     mass = np.bincount(cells.owner, brightness, len(cells.points))
@@ -115,34 +120,39 @@ def _follow_lamp(lights: LightSet, rows: np.ndarray, context: LightContext, lamp
     stay[np.flatnonzero(valid)[crowded]] = False
     cells = Cells(emission.domain, domain[stay], cells, np.delete(np.arange(len(cells.points)), crowded))
     taken = cells.fill(len(rows) - int(stay.sum()))
-    part = Emission(*(array[taken] for array in emission))
+    replacing = Emission(*(array[taken] for array in emission))
     numbers = PathNumbers(np.full(len(taken), key), index[taken].astype(np.uint32))
-    new = trace(context, light, lamp, part, u[taken, 2:], numbers, bounces)
+    new = trace(context, light, lamp, replacing, u[taken, 2:], numbers, bounces, beam)
     power = np.stack([np.bincount(cells.owner, emission.power[:, c], len(cells.points)) for c in range(3)], axis=1) / len(index)
-    kept_gain = shading_gain(paths.first_shading[rows[stay]], normals[stay], directions[stay]) * near_gain(light, first[stay])
+    kept_gain = (shading_gain(paths.first_shading[rows[stay]], normals[stay], directions[stay])[:, None]
+                 * arriving_share(light, first[stay], paths.u[rows[stay]], beam))
     power_of_rows = np.zeros((len(rows), 3), np.float32)
     count = int(stay.sum())
-    power_of_rows[stay] = power[:count] * np.where(met[stay], kept_gain, 1.0)[:, None]
-    new_gain = shading_gain(new.first_shading, new.first_normal, part.directions) * near_gain(light, new.first)
-    new = replace(new, power=(power[count:] * np.where(new.met, new_gain, 1.0)[:, None]).astype(np.float32))
+    power_of_rows[stay] = power[:count] * np.where(met[stay, None], kept_gain, 1.0)
+    new_gain = (shading_gain(new.first_shading, new.first_normal, replacing.directions)[:, None]
+                * arriving_share(light, new.first, new.u, beam))
+    new = replace(new, power=(power[count:] * np.where(new.met[:, None], new_gain, 1.0)).astype(np.float32))
     return stay, power_of_rows, new
 
 
 def _can_follow(old: Light, new: Light) -> bool:
-    """Whether a path of ``old`` can be one of ``new``: the same kind, with shadows, and rays that spread."""
-    if type(old) is not type(new) or not (old.casts_shadow and new.casts_shadow):
+    """Whether a path of ``old`` can be one of ``new``: the same kind, with shadows, rays that spread, and places on the lamp that
+    all shine alike."""
+    if type(old) is not type(new) or not old.casts_shadow or old.linking is not None or old.max_bounces != new.max_bounces:
         return False
-    return not isinstance(new, AreaLight) or (new.spread > 0 and old.shape == new.shape)
+    if any(light.profile is not None and (light.profile.by_place is not None or light.profile.of_normals) for light in (old, new)):
+        return False
+    return kind_of(new).can_follow(old, new)
 
 
 def _same(old: Light, new: Light, but: tuple[str, ...] = ()) -> bool:
-    return type(old) is type(new) and all(np.array_equal(getattr(old, item.name), getattr(new, item.name)) for item in fields(old)
+    return type(old) is type(new) and all(same_values(getattr(old, item.name), getattr(new, item.name)) for item in fields(old)
                                           if item.name not in ("name", *but))
 
 
 def _recoloured(old: Light, new: Light) -> np.ndarray | None:
     """New over old strength (3,) of a lamp that changed in nothing else; None if it did, or was black in a channel."""
-    name = next(item.name for item in fields(old) if item.name in ("irradiance", "intensity", "radiance"))
+    name = old.STRENGTH
     if not _same(old, new, (name,)) or not np.all(getattr(old, name) > 0):
         return None
     return np.asarray(getattr(new, name) / getattr(old, name), np.float32)

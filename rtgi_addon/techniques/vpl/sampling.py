@@ -12,10 +12,12 @@ import numpy as np
 from ...numerics import octahedral
 from ...numerics.sampling import hash_u32, sobol_owen, sphere_from_square
 from ...progress import Progress
-from ...scene import ProbeVolume, SunLight
+from ...scene import ProbeVolume
+from ...scene.memory import require_memory
 from ...transport.context import LightContext
-from ...transport.light_emission import Beam
-from ...transport.light_paths import (
+from ...transport.lights.beam import Beam
+from ...transport.parallel import chunks, parallel_for
+from ...transport.paths.from_lights import (
     FROM_EMITTERS,
     FROM_WORLD,
     LightPaths,
@@ -26,14 +28,18 @@ from ...transport.light_paths import (
     world_directions,
     world_paths,
 )
-from ...transport.parallel import chunks, parallel_for
-from ...transport.rays import offset_origins
-from ...transport.vectors import dot, luminance
-from ...transport.virtual_lights import VirtualLights
+from ...transport.rays.tracer import offset_origins
+from ...transport.vectors import faced, luminance
+from ..lattice.resample import thread_bytes
 from .gather import BLOCK_PAIRS, cast_shadows, transfer_of
+from .virtual_lights import VirtualLights
 
 # Pilot receivers: so many free points of the volumes, and as many on the surfaces seen from them.
 PILOTS = 48
+# Numbers of a pilot: a place in a volume, and a direction from there.
+_PILOT_DIMENSIONS = 5
+# Tell the pilots' numbers, and where choices start, apart from all others of a seed: the letters pi and sy.
+_PILOTS, _SYSTEMATIC = 0x7069, 0x7379
 # Chance of a candidate by its flux alone, against that by what the pilots get from it.
 FLUX_SHARE = 0.1
 # Pilots take lights nearer than this share of the volumes' radius as this near: one of them shall not decide alone.
@@ -42,6 +48,18 @@ NEAREST = 0.1
 MORE_PATHS, MAX_ROUNDS = 4, 2
 # One distant light for so many VPLs where there is a world, and candidates tried for each.
 DISTANT_SHARE, DISTANT_CANDIDATES = 0.25, 4
+# And no fewer than so many.
+FEWEST_DISTANT = 64
+# Directions in which the world's power is estimated.
+_WORLD_DIRECTIONS = 256
+# Candidates that a path leaves where half of the light is reflected; memory of each at the peak, measured with up to a million.
+_CANDIDATES_PER_PATH, BYTES_PER_CANDIDATE = 2, 230
+# How far a round of sampling is when its paths are traced.
+_TRACED = 0.3
+# Halvings of the interval in which the scale of chances lies: more than a float64 tells apart.
+_BISECTIONS = 60
+# Bits of a place on the Z-order curve along each axis, and what a box is wide there: its far side belongs to the last cell.
+_MORTON_BITS, _MORTON_WIDTH = 10, 1023.999
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,13 +98,13 @@ class LightSet:
         paths = self.paths
         order = np.argsort(morton(paths.positions), kind="stable")
         lights = VirtualLights(paths.positions, paths.normals, paths.flux.astype(np.float32), paths.source[paths.path],
-                               np.minimum(paths.bounce, 127).astype(np.int8), paths.path.astype(np.int32))
+                               np.minimum(paths.bounce, np.iinfo(np.int8).max).astype(np.int8), paths.path.astype(np.int32))
         return lights.take(order).with_distant(self.directions, self.irradiance)
 
 
 def pilots_in(context: LightContext, volumes: tuple[ProbeVolume, ...], radius: float, seed: int) -> Pilots:
     """Receivers in and about ``volumes``, whose common sphere has ``radius`` [m]."""
-    u = sobol_owen(PILOTS, 5, hash_u32(seed, 0x7069))
+    u = sobol_owen(PILOTS, _PILOT_DIMENSIONS, hash_u32(seed, _PILOTS))
     matrices = np.stack([np.asarray(volume.world_from_local, np.float64) for volume in volumes])
     chosen = matrices[np.arange(PILOTS) % len(volumes)]
     points = (np.einsum("nij,nj->ni", chosen[:, :3, :3], 2.0 * u[:, :3] - 1.0) + chosen[:, :3, 3]).astype(np.float32)
@@ -94,8 +112,7 @@ def pilots_in(context: LightContext, volumes: tuple[ProbeVolume, ...], radius: f
     hits = context.tracer.intersect(points, directions)
     rows = np.flatnonzero(hits.primitive >= 0)
     primitive = hits.primitive[rows]
-    normals = context.geometry.normals_world[primitive]
-    normals = normals * -np.copysign(np.float32(1.0), dot(normals, directions[rows]))[:, None]
+    normals = faced(context.geometry.normals_world[primitive], directions[rows])
     surface = offset_origins(context.geometry.points(primitive, hits.u[rows], hits.v[rows]), normals, normals, hits.t[rows])
     return Pilots(points, surface, normals, 1.0 / (NEAREST * max(radius, 1e-6)) ** 2)
 
@@ -106,11 +123,14 @@ def sample_lights(context: LightContext, volumes: tuple[ProbeVolume, ...], setti
     beam = Beam(np.array(context.geometry.bounds()), *focus)
     pilots = pilots_in(context, volumes, focus[1], seed)
     distant = distant_lights(context, pilots, settings.lights, seed)
+    paths = no_paths()
     for rounds in range(MAX_ROUNDS):
         span = progress.span(rounds / MAX_ROUNDS, (rounds + 1) / MAX_ROUNDS)
         counts = paths_per_source(context, beam, focus[1], path_count(settings) * MORE_PATHS**rounds)
-        paths = _all_paths(context, counts, beam, settings.bounces, seed, span.span(0.0, 0.3))
-        transfer = pilot_transfer(context, paths, pilots, span.span(0.3, 1.0))
+        candidates = MORE_PATHS * len(paths.path) if rounds else sum(count for _, count in counts) * _CANDIDATES_PER_PATH
+        require_memory({"virtual lights": candidates * BYTES_PER_CANDIDATE, "threads": thread_bytes(context)})
+        paths = _all_paths(context, counts, beam, settings.bounces, seed, span.span(0.0, _TRACED))
+        transfer = pilot_transfer(context, paths, pilots, span.span(_TRACED, 1.0))
         reached = luminance(paths.flux) * transfer
         # As many as would give the same variance if all gave the same (Kish).
         if not reached.any() or reached.sum() ** 2 >= settings.lights * (reached**2).sum():
@@ -132,7 +152,7 @@ def _all_paths(context, counts, beam, bounces, seed, progress) -> LightPaths:
 
 def path_count(settings) -> int:
     """Light paths that leave about ``candidates`` VPLs for each that is kept, where half of the light is reflected."""
-    return max(1, settings.lights * settings.candidates // 2)
+    return max(1, settings.lights * settings.candidates // _CANDIDATES_PER_PATH)
 
 
 def source_paths(context: LightContext, source: int, count: int, beam: Beam, bounces: int | None, seed: int) -> LightPaths:
@@ -152,12 +172,11 @@ def paths_per_source(context: LightContext, beam: Beam, radius: float, total: in
     twice as wide as the volumes, the rest of which it lights for others."""
     disk = np.pi * min(2.0 * radius, beam.radius) ** 2
     power = context.lamps.power_estimate.astype(np.float64)
-    suns = np.array([isinstance(light, SunLight) for light in context.scene.lights], bool)
-    power[suns] *= disk / np.pi
+    power[context.lamps.is_distant] *= disk / np.pi
     sources = [(lamp, float(value)) for lamp, value in enumerate(power)]
     sources.append((FROM_EMITTERS, context.emitters.total_power))
     if not context.environment.is_black:
-        _, value = world_directions(context, np.arange(256), 0)
+        _, value = world_directions(context, np.arange(_WORLD_DIRECTIONS), 0)
         sources.append((FROM_WORLD, float(luminance(value).mean()) * disk))
     sources = [(source, value) for source, value in sources if value > 0]
     whole = sum(value for _, value in sources)
@@ -178,7 +197,8 @@ def pilot_transfer(context: LightContext, paths: LightPaths, pilots: Pilots, pro
         total = np.zeros(span.stop - span.start)
         for points, normals in receivers:
             towards, transfer = transfer_of(points, normals, lights, pilots.bound)
-            cast_shadows(context, points, towards, transfer)
+            tint = cast_shadows(context, points, towards, transfer)
+            transfer = transfer if tint is None else transfer * tint.mean(axis=2)
             total += transfer.sum(axis=0, dtype=np.float64)
         result[span] = total
 
@@ -197,7 +217,7 @@ def _scales(contribution: np.ndarray, flux: np.ndarray, budget: int) -> tuple[fl
         scale = 1.0 / chance[chance > 0].min()
     else:
         low, high = 0.0, 1.0 / chance[chance > 0].min()
-        for _ in range(60):
+        for _ in range(_BISECTIONS):
             scale = 0.5 * (low + high)
             low, high = (scale, high) if np.minimum(1.0, scale * chance).sum() < budget else (low, scale)
     return (scale * (1.0 - share) / total if total > 0 else 0.0), scale * share / total_flux
@@ -220,7 +240,7 @@ def systematic(chance: np.ndarray, order: np.ndarray, seed: int) -> np.ndarray:
     """Rows (k,) int64, ascending, each chosen with its ``chance`` (n,) in [0, 1]: evenly along the curve that ``order`` (n,) gives,
     so that the choice is as stratified as the rows are, and k is the sum of chances to within one."""
     along = np.argsort(order, kind="stable")
-    start = int(hash_u32(seed, 0x7379)) / 2.0**32
+    start = int(hash_u32(seed, _SYSTEMATIC)) / 2.0**32
     steps = np.floor(np.cumsum(chance[along]) + start)
     chosen = np.diff(steps, prepend=np.floor(start)) > 0
     return np.sort(along[chosen])
@@ -232,10 +252,10 @@ def morton(points: np.ndarray) -> np.ndarray:
         return np.zeros(0, np.uint64)
     low = points.min(axis=0)
     extent = max(float((points.max(axis=0) - low).max()), 1e-30)
-    cell = np.minimum((points - low) * (1023.999 / extent), 1023).astype(np.uint64)
+    cell = np.minimum((points - low) * (_MORTON_WIDTH / extent), 2**_MORTON_BITS - 1).astype(np.uint64)
     code = np.zeros(len(points), np.uint64)
     dimensions = points.shape[1]
-    for bit in range(10):
+    for bit in range(_MORTON_BITS):
         for axis in range(dimensions):
             code |= ((cell[:, axis] >> np.uint64(bit)) & np.uint64(1)) << np.uint64(dimensions * bit + axis)
     return code
@@ -246,7 +266,7 @@ def distant_lights(context: LightContext, pilots: Pilots, budget: int, seed: int
     pilots see them."""
     if context.environment.is_black:
         return np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32)
-    wanted = max(64, int(DISTANT_SHARE * budget))
+    wanted = max(FEWEST_DISTANT, int(DISTANT_SHARE * budget))
     count = wanted * DISTANT_CANDIDATES
     travel, value = world_directions(context, np.arange(count), seed)
     directions, value = -travel, value / np.float32(count)
@@ -254,8 +274,8 @@ def distant_lights(context: LightContext, pilots: Pilots, budget: int, seed: int
     free = np.zeros(count)
     for span in chunks(count, max(1, BLOCK_PAIRS // len(receivers))):
         rays = np.repeat(directions[span], len(receivers), axis=0)
-        blocked = context.tracer.occluded(np.tile(receivers, (span.stop - span.start, 1)), rays)
-        free[span] = (~blocked).reshape(-1, len(receivers)).mean(axis=1)
+        passed = context.tracer.transmittance(np.tile(receivers, (span.stop - span.start, 1)), rays)
+        free[span] = passed.mean(axis=1).reshape(-1, len(receivers)).mean(axis=1)
     brightness = luminance(value).astype(np.float64)
     by_contribution, by_flux = _scales(free * brightness, brightness, wanted)
     chance = np.minimum(by_contribution * free * brightness + by_flux * brightness, 1.0)

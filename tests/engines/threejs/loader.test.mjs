@@ -12,8 +12,8 @@ const folder = pathToFileURL(`${process.env.EXPORT}/`);
 const { RTGILightProbe, RTGIProbeLoader } = await import(new URL('rtgi/RTGIProbeVolumes.js', folder));
 const THREE = await import(new URL('node_modules/three/build/three.module.js', folder));
 
-const description = JSON.parse(await readFile(new URL('probes.json', folder)));
-const file = await readFile(new URL('probes.bin', folder));
+const description = JSON.parse(await readFile(new URL('rtgi/probes.json', folder)));
+const file = await readFile(new URL('rtgi/probes.bin', folder));
 const buffer = file.buffer.slice(file.byteOffset, file.byteOffset + file.byteLength);
 const parse = (changes = {}, content = buffer) => new RTGIProbeLoader().parse({ ...description, ...changes }, content);
 
@@ -36,14 +36,23 @@ test('loads over HTTP from the folder of the .json', async () => {
   await new Promise((resolve) => server.once('listening', resolve));
   const root = `http://127.0.0.1:${server.address().port}/deep/`;
   try {
-    const probes = await new RTGIProbeLoader().loadAsync(`${root}probes.json`);
+    const probes = await new RTGIProbeLoader().loadAsync(`${root}rtgi/probes.json`);
     assert.equal(probes.volumes.length, description.volumes.length);
-    assert.equal((await new RTGIProbeLoader().setPath(root).loadAsync('probes.json')).name, description.scene);
+    assert.equal((await new RTGIProbeLoader().setPath(root).loadAsync('rtgi/probes.json')).name, description.scene);
     await assert.rejects(new RTGIProbeLoader().loadAsync(`${root}missing.json`), /missing\.json could not be read.*404/s);
   } finally {
     server.close();
     server.closeAllConnections();
   }
+});
+
+test('knows which lamps of the glTF are in the probes', () => {
+  const lamp = (name) => Object.assign(new THREE.PointLight(), { name: name.replace('.', ''), userData: { name } });
+  const probes = parse({ includesDirect: true, lamps: { 'Key.001': 'all', Fill: 'bounces' }, objects: { Door: 'dynamic' } });
+  assert.ok(probes.holdsDirect(lamp('Key.001')) && !probes.holdsDirect(lamp('Fill')) && !probes.holdsDirect(lamp('Another')));
+  assert.equal(probes.objects.Door, 'dynamic');
+  assert.ok(parse({ includesDirect: true, lamps: undefined }).holdsDirect(lamp('Any')));
+  assert.ok(!parse({ includesDirect: false, lamps: {} }).holdsDirect(lamp('Any')));
 });
 
 test('refuses what does not belong together, saying why', () => {

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from rtgi_addon.exchange.bundle import Bundle
-from rtgi_addon.exchange.engines.conformance import kit_field
+from rtgi_addon.exchange.engines.kit import kit_field
 
 
 @pytest.fixture(scope="session")

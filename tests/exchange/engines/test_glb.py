@@ -6,7 +6,7 @@ import struct
 import numpy as np
 import pytest
 
-from rtgi_addon.exchange.engines.glb import set_lamps
+from rtgi_addon.exchange.engines.glb import correct
 
 
 def content_of(path):
@@ -28,7 +28,7 @@ def write(path, content):
 def test_strengths_by_name(tmp_path):
     lights = [{"name": "Sun", "type": "directional", "intensity": 1}, {"name": "Other", "type": "point", "intensity": 3}]
     rest = write(tmp_path / "a.glb", {"asset": {"version": "2.0"}, "extensions": {"KHR_lights_punctual": {"lights": lights}}})
-    set_lamps(tmp_path / "a.glb", {"Sun": np.array([25.0, 20.0, 5.0]), "Unknown": np.ones(3)})
+    correct(tmp_path / "a.glb", {"Sun": np.array([25.0, 20.0, 5.0]), "Unknown": np.ones(3)}, {})
     content, kept = content_of(tmp_path / "a.glb")
     sun, other = content["extensions"]["KHR_lights_punctual"]["lights"]
     assert sun == {"name": "Sun", "type": "directional", "intensity": 25.0, "color": [1.0, 0.8, 0.2]} and other == lights[1]
@@ -37,7 +37,7 @@ def test_strengths_by_name(tmp_path):
 
 def test_a_model_without_lamps(tmp_path):
     rest = write(tmp_path / "a.glb", {"asset": {"version": "2.0"}})
-    set_lamps(tmp_path / "a.glb", {"Sun": np.ones(3)})
+    correct(tmp_path / "a.glb", {"Sun": np.ones(3)}, {"Cube.001": "Cube"})
     assert content_of(tmp_path / "a.glb") == ({"asset": {"version": "2.0"}}, rest)
 
 

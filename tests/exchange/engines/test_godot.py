@@ -12,11 +12,11 @@ from rtgi_addon.errors import BakeError
 from rtgi_addon.exchange import engines
 from rtgi_addon.exchange.engines import ExportSettings
 from rtgi_addon.exchange.engines.axes import Y_UP
-from rtgi_addon.exchange.engines.godot import MAX_VOLUMES, shader_include
+from rtgi_addon.exchange.engines.godot import MAX_SCATTERED, MAX_VOLUMES, shader_include
 from rtgi_addon.exchange.engines.godot.light_data import LightData, light_data
 from rtgi_addon.exchange.engines.volumes import engine_field, export_volumes
 from rtgi_addon.exchange.exr import read_exr
-from rtgi_addon.techniques.probes.field import ProbeField
+from rtgi_addon.techniques.lattice.field import ProbeField
 
 GODOT = engines.get("godot")
 
@@ -69,15 +69,24 @@ def test_without_the_kit_and_with_a_model(kit_bundle, tmp_path):
     assert not [name for name in report.files if name.startswith("conformance")]
 
 
-def test_a_second_export_replaces_one_that_godot_imported(kit_bundle, export):
-    for name in (".godot/imported/probes.ctex3d", "rtgi/volumes.gd.uid", "model.glb.import", "model_0.png", ".gitignore"):
+def test_a_second_export_leaves_what_godot_and_the_user_wrote(kit_bundle, export):
+    record, sample = export / "rtgi/Known/probes.exr.import", export / "sample.gd"
+    names = (".godot/imported/probes.ctex3d", "rtgi/volumes.gd.uid", "model.glb.import", "model_0.png", ".gitignore", "level.tscn")
+    for name in names:
         (export / name).parent.mkdir(parents=True, exist_ok=True)
-        (export / name).write_text("")
-    GODOT.export(kit_bundle, export)
-    assert not (export / ".godot").exists()
-    (export / "level.tscn").write_text("")
-    with pytest.raises(BakeError, match=r"level\.tscn"):
-        GODOT.export(kit_bundle, export)
+        (export / name).write_text("mine")
+    sample.write_text(sample.read_text() + "# mine\n")
+    # As the editor completes it, for a bake of another resolution.
+    completed = record.read_text().replace("[remap]\n", '[remap]\n\nuid="uid://b2k"\n')
+    completed = completed.replace("compress/mode=0", "compress/mode=1")
+    vertical = re.search(r"slices/vertical=\d+", completed)[0]
+    record.write_text(completed.replace(vertical, "slices/vertical=3"))
+    report = GODOT.export(kit_bundle, export)
+    assert report.kept == ("sample.gd",) and sample.read_text().endswith("# mine\n")
+    assert all((export / name).read_text() == "mine" for name in names)
+    assert record.read_text() == completed
+    record.write_text(completed.replace("3d_texture", "texture"))
+    assert record.name in GODOT.export(kit_bundle, export).kept[0]
 
 
 def test_textures_hold_what_the_shader_reads(export, volumes):
@@ -86,6 +95,10 @@ def test_textures_hold_what_the_shader_reads(export, volumes):
         planes, _ = read_exr(export / "rtgi" / entry["probes"])
         assert all(plane.dtype == np.float16 for plane in planes.values())
         texels = np.stack([planes[name] for name in "RGBA"], axis=-1).reshape(8, nz, ny, nx, 4).astype(np.float32)
+        if "words" in entry:
+            words, _ = read_exr(export / "rtgi" / entry["words"])
+            stored = np.stack([words[name] for name in "RGBA"], axis=-1)
+            assert np.array_equal(stored, volume.words.reshape(-1, *volume.words.shape[2:]))
         assert np.array_equal(texels[0, ..., :3], volume.offset) and np.array_equal(texels[0, ..., 3] != 0, volume.live)
         blocks = texels[1:7].reshape(3, 2, nz, ny, nx, 4)
         for channel in range(3):
@@ -101,16 +114,18 @@ def test_textures_hold_what_the_shader_reads(export, volumes):
         assert f"slices/horizontal=1\nslices/vertical={8 * nz}" in settings
 
 
-@pytest.mark.parametrize("count", [1, 3])
-def test_the_include_has_every_volume_and_no_mark(count):
-    text = shader_include(count)
+@pytest.mark.parametrize(("count", "scattered"), [(1, False), (3, False), (2, True)])
+def test_the_include_has_every_volume_and_no_mark(count, scattered):
+    text = shader_include(count, scattered=scattered)
+    assert text.count("uniform sampler3D rtgi_words_") == count * scattered
     assert "@" not in text and text.count("uniform sampler3D rtgi_probes_") == count
     assert f"rtgi_size_{count - 1}" in text and f"rtgi_size_{count}" not in text and text.count("{") == text.count("}")
 
 
 def test_too_many_volumes_are_refused(kit_bundle, tmp_path):
-    with pytest.raises(BakeError, match=f"{3 * MAX_VOLUMES} volumes"):
-        GODOT.export(replace(kit_bundle, grids=MAX_VOLUMES * kit_bundle.grids), tmp_path / "out")
+    for grids, most in (((MAX_VOLUMES + 1) * kit_bundle.grids[:1], MAX_VOLUMES), (2 * kit_bundle.grids, MAX_SCATTERED)):
+        with pytest.raises(BakeError, match=f"{len(grids)} volumes, and a shader in Godot has samplers for {most}"):
+            GODOT.export(replace(kit_bundle, grids=grids), tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
@@ -142,7 +157,7 @@ def world(volume, lattice):
 
 
 def test_a_tap_at_a_probe_is_that_probe(volumes, data):
-    for volume in volumes:
+    for volume in (volume.on_nodes for volume in volumes):
         nz, ny, nx = volume.live.shape
         lattice = np.stack(np.meshgrid(np.arange(nz), np.arange(ny), np.arange(nx), indexing="ij")[::-1], axis=-1).reshape(-1, 3)
         points = world(volume, lattice)
@@ -159,7 +174,7 @@ def test_a_tap_at_a_probe_is_that_probe(volumes, data):
 
 def test_taps_reproduce_what_is_linear_and_reach_the_faces(volumes, data):
     """Barycentric weights are exact for linear functions, between the outermost probes; beyond, the outermost ones go on."""
-    volume = volumes[2]
+    volume = volumes[3]
     slope = np.array([0.3, -0.7, 0.5])
     linear = LightData(data.points, np.broadcast_to((data.points @ slope)[:, None, None], data.sh.shape).astype(np.float32),
                        data.tetrahedra, data.planes, data.children, data.bounds)

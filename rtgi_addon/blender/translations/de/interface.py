@@ -25,7 +25,35 @@ INTERFACE: dict[str, str] = {
     "Stability": "Stabilität",
     "Preview": "Vorschau",
     "Shadow Maps": "Schattenkarten",
-    "Overlays": "Überlagerungen",
+    "Effects": "Effekte",
+    "Ray-Traced Light": "Licht durch Strahlen",
+    "Indirect and mirrored light by rays from every pixel: exact, not fast":
+        "Indirektes und gespiegeltes Licht durch Strahlen von jedem Pixel aus: genau, nicht schnell",
+    "Media": "Medien",
+    "Media Presets": "Medien-Voreinstellungen",
+    "The preset": "Die Voreinstellung",
+    "Show media as this preset says": "Medien so zeigen, wie diese Voreinstellung sagt",
+    "Apply Media Preset": "Medien-Voreinstellung anwenden",
+    "Keep how media are shown as a preset, or remove one":
+        "Wie Medien gezeigt werden als Voreinstellung behalten oder eine entfernen",
+    "Add Media Preset": "Medien-Voreinstellung hinzufügen",
+    "To move about in: columns of 16 pixels in 32 slices": "Zum Umsehen: Säulen von 16 Pixeln in 32 Scheiben",
+    "To judge a picture: columns of 8 pixels in 64 slices": "Um ein Bild zu beurteilen: Säulen von 8 Pixeln in 64 Scheiben",
+    "For small smoke and sharp shafts: columns of 3 pixels in 96 slices, ten times the work":
+        "Für kleinen Rauch und scharfe Lichtbahnen: Säulen von 3 Pixeln in 96 Scheiben, die zehnfache Arbeit",
+    "Find Media": "Medien suchen",
+    "No fog, smoke or fire was found": "Kein Nebel, Rauch oder Feuer gefunden",
+    "and {count} more": "und {count} weitere",
+    "{name}: glows, and takes no light": "{name}: leuchtet und nimmt kein Licht",
+    "{name}: mean free path from {path} m, albedo {albedo}, g {g}":
+        "{name}: mittlere freie Weglänge ab {path} m, Albedo {albedo}, g {g}",
+    "{name}: mean free path {path} m, albedo {albedo}, g {g}":
+        "{name}: mittlere freie Weglänge {path} m, Albedo {albedo}, g {g}",
+    ", glows": ", leuchtet",
+    "What fog, smoke and fire take, scatter and give between the eye and surfaces":
+        "Was Nebel, Rauch und Feuer zwischen Auge und Flächen nehmen, streuen und geben",
+    "Mist": "Nebel",
+    "What is further away fades into the world or a colour": "Was weiter weg ist, verschwindet in der Welt oder in einer Farbe",
     "Compare": "Vergleichen",
     "Film": "Film",
     "Passes": "Durchgänge",
@@ -50,7 +78,8 @@ INTERFACE: dict[str, str] = {
     "The scene or its settings have changed since": "Die Szene oder ihre Einstellungen haben sich seither geändert",
     "Probes": "Sonden",
     "Usable": "Brauchbar",
-    "Estimated Error": "Geschätzter Fehler",
+    "Error on Surfaces": "Fehler auf Flächen",
+    "Noise at Probes": "Rauschen an Sonden",
     "unknown": "unbekannt",
     "Time": "Zeit",
     "Nothing to report": "Nichts zu melden",
@@ -62,7 +91,6 @@ INTERFACE: dict[str, str] = {
     "Show on Surfaces": "Auf Flächen zeigen",
     "Test This Scene": "Diese Szene prüfen",
     "This Scene, All Techniques": "Diese Szene, alle Techniken",
-    "Built-in Scenes": "Eingebaute Szenen",
     "Sample {sample} of {samples}": "Abtastwert {sample} von {samples}",
     "Relighting": "Beleuchtet neu",
     "Right of the line: {note}": "Rechts der Linie: {note}",
@@ -71,24 +99,38 @@ INTERFACE: dict[str, str] = {
     # Operators: labels, tooltips, what they report and why they are greyed out.
     "Bake Probes": "Sonden backen",
     "Bake the light of this scene into its Light Probe Volumes": "Das Licht dieser Szene in ihre Lichtsondenvolumen backen",
+    "Select What a Line Is About": "Auswählen, wovon eine Zeile handelt",
+    "Select the objects that this line is about": "Wählt die Objekte aus, von denen diese Zeile handelt",
+    "Objects": "Objekte",
+    "Names of objects, one a line": "Namen von Objekten, einer je Zeile",
+    "Materials": "Materialien",
+    "Names of materials, one a line: whatever carries one of them is selected":
+        "Namen von Materialien, einer je Zeile: ausgewählt wird, was eines davon trägt",
+    "Nothing of that name can be selected in this view layer": "Nichts dieses Namens ist in diesem View Layer auswählbar",
+    "Verify with Cycles": "Mit Cycles prüfen",
+    "Compare what is read of this scene, and its bake, with Cycles at a few places, and find what makes a difference":
+        "Vergleicht, was von dieser Szene gelesen wird, und ihr Gebackenes an wenigen Stellen mit Cycles und sucht, was einen "
+        "Unterschied macht",
+    "Stop the verification": "Beendet die Prüfung",
+    "Cancel Verification": "Prüfung abbrechen",
+    "Against Cycles": "Gegen Cycles",
+    "A verification or a bake is already running": "Es wird schon geprüft oder gebacken",
+    "Verification cancelled": "Prüfung abgebrochen",
+    "Without {name}: {difference}": "Ohne {name}: {difference}",
+    "the world": "die Welt",
     "A bake is already running": "Es wird schon gebacken",
-    "Baking reads the scene in Object Mode": "Gebacken wird im Objektmodus",
     "Bake cancelled; the last one is as it was": "Backen abgebrochen; das letzte Ergebnis ist, wie es war",
-    "Baked {probes:,} probes in {time}, estimated error {error:.2g}%":
-        "{probes:,} Sonden in {time} gebacken, geschätzter Fehler {error:.2g} %",
+    "Baked {probes:,} probes in {time}, light on surfaces off by {error:.2g}%":
+        "{probes:,} Sonden in {time} gebacken, Licht auf Flächen um {error:.2g} % falsch",
     "Baked {probes:,} probes in {time}": "{probes:,} Sonden in {time} gebacken",
     "Cancel Bake": "Backen abbrechen",
     "Stop the bake. What was baked before stays as it is": "Das Backen anhalten. Was vorher gebacken war, bleibt, wie es ist",
     "Check Scene": "Szene prüfen",
-    "Read the scene as a bake would and list what would spoil it, without tracing a ray":
-        "Die Szene lesen wie zum Backen und auflisten, was es verdürbe, ohne einen Strahl zu verfolgen",
+    "Read the scene as a bake would and list what would spoil it, and what of it is not followed":
+        "Die Szene wie zum Backen lesen und auflisten, was es verderben würde und wem darin nicht gefolgt wird",
     "1 thing to look at": "1 Auffälligkeit",
     "{count} things to look at": "{count} Auffälligkeiten",
     "Nothing stands in the way of a bake": "Dem Backen steht nichts im Weg",
-    "Add Fitted Volume": "Angepasstes Volumen hinzufügen",
-    "Add a Light Probe Volume that fits the scene, with evenly spaced probes":
-        "Ein Lichtsondenvolumen hinzufügen, das zur Szene passt, mit gleichmäßig verteilten Sonden",
-    "Added {volume} with {x} × {y} × {z} = {probes:,} probes": "{volume} mit {x} × {y} × {z} = {probes:,} Sonden hinzugefügt",
     "Open Bake Folder": "Ordner öffnen",
     "Show the folder of the last bake in the system's file browser":
         "Den Ordner des letzten Backens in der Dateiverwaltung des Systems zeigen",
@@ -118,6 +160,10 @@ INTERFACE: dict[str, str] = {
     "Relative noise at which the reference stops": "Relatives Rauschen, bei dem die Referenz aufhört",
     "Error Maps": "Fehlerkarten",
     "Also draw where in the scene each technique is wrong": "Auch zeichnen, wo in der Szene jede Technik irrt",
+    "Pictures of Effects": "Bilder mit Effekten",
+    "Also hold pictures with effects to Cycles', through the scene's camera; Blender waits while it renders":
+        "Auch Bilder mit Effekten durch die Kamera der Szene mit denen von Cycles vergleichen; Blender wartet, solange es rendert",
+    "Error of the Picture": "Fehler des Bildes",
     "Reference": "Referenz",
     "What is held to be right": "Was als richtig gilt",
     "Path Tracer": "Pfadverfolgung",
@@ -126,7 +172,6 @@ INTERFACE: dict[str, str] = {
     "Cycles, on the CPU; Blender waits while it renders": "Cycles auf der CPU; Blender wartet, solange es rendert",
     "A chart or a bake is already running": "Es wird schon gemessen oder gebacken",
     "Chart cancelled": "Vergleich abgebrochen",
-    "Chart cancelled; {count} settings are in {folder}": "Vergleich abgebrochen; {count} Einstellungen sind in {folder}",
     "Charted {count} settings into {folder}": "{count} Einstellungen verglichen, Ergebnis in {folder}",
     "Cancel Chart": "Vergleich abbrechen",
     "Stop measuring. What was measured is kept": "Das Messen anhalten. Was gemessen ist, bleibt erhalten",
@@ -139,6 +184,8 @@ INTERFACE: dict[str, str] = {
     "A bake or a search is already running": "Es wird schon gebacken oder gesucht",
     "Bake with this technique first: a bake from disk has no scene to compare with":
         "Erst mit dieser Technik backen: zu Gebackenem von der Platte gibt es keine Szene zum Vergleichen",
+    "Cancel Search": "Suche abbrechen",
+    "Stop searching. What was found before is kept": "Die Suche anhalten. Vorher Gefundenes bleibt erhalten",
     "Search cancelled; what was found before is kept": "Suche abgebrochen; vorher Gefundenes bleibt erhalten",
     "Test Stability": "Stabilität prüfen",
     "Bake this scene with its volumes and lamps moved, or built-in ones in which methods are known to fail, and report what "
@@ -152,8 +199,11 @@ INTERFACE: dict[str, str] = {
     "This Scene": "Diese Szene",
     "Test this scene instead of the built-in ones": "Diese Szene statt der eingebauten prüfen",
     "A bake or a measurement is already running": "Es wird schon gebacken oder gemessen",
-    "Stability test cancelled; what was measured is beside the bake's folder":
-        "Prüfung abgebrochen; was gemessen ist, liegt neben dem Ordner des Backens",
+    "Cancel Test": "Prüfung abbrechen",
+    "Stop testing. What was measured is kept": "Die Prüfung anhalten. Was gemessen ist, bleibt erhalten",
+    "Stability test cancelled": "Prüfung abgebrochen",
+    "Continue": "Fortsetzen",
+    "Go on from what a cancelled run has measured": "Dort weitermachen, wo ein abgebrochener Lauf aufhörte",
     "{case} of {technique}": "{case} von {technique}",
     "{count} figures hold. See the text {text!r} and {folder}": "{count} Werte halten. Siehe den Text {text!r} und {folder}",
     "{failed} of {count} figures are above their goals: {listed}. The text {text!r} says what helps":
@@ -175,12 +225,24 @@ INTERFACE: dict[str, str] = {
         "Das zuletzt Gebackene als Texturen, Shader und Beispielszene einer Engine schreiben",
     "Engine": "Engine",
     "For which engine the probes are written": "Für welche Engine die Sonden geschrieben werden",
-    "Where the export goes; an earlier export there is replaced": "Wohin der Export geht; ein früherer dort wird ersetzt",
+    "Part": "Teil",
+    "How much of the export is written": "Wie viel des Exports geschrieben wird",
+    "Sample Project": "Beispielprojekt",
+    "A project that runs as it is, with the probes in it": "Ein Projekt mit den Sonden darin, das läuft, wie es ist",
+    "Probes Only": "Nur Sonden",
+    "The folder with the probes and what reads them, into a project of your own":
+        "Der Ordner mit den Sonden und dem, was sie liest, in ein eigenes Projekt",
+    "Where the export goes; files of an earlier export there are replaced, unless somebody changed them":
+        "Wohin der Export geht; Dateien eines früheren dort werden ersetzt, außer wenn jemand sie geändert hat",
+    "{name} was changed since the last export and stays as it is":
+        "{name} wurde seit dem letzten Export geändert und bleibt, wie es ist",
+    "{count} files for {engine} in {folder}": "{count} Dateien für {engine} in {folder}",
     "Model": "Modell",
     "Write what renders of this scene as glTF into the sample scene, lit by the probes":
         "Was von dieser Szene gerendert wird, als glTF in die Beispielszene schreiben, von den Sonden beleuchtet",
     "A bake or an export is already running": "Es wird schon gebacken oder exportiert",
-    "Bake first: there is nothing in the output folder": "Erst backen: im Ausgabeordner liegt nichts",
+    "Cancel Export": "Export abbrechen",
+    "Stop writing. An earlier export stays as it is": "Das Schreiben anhalten. Ein früherer Export bleibt, wie er ist",
     "Export cancelled; an earlier one is as it was": "Export abgebrochen; ein früherer ist, wie er war",
     "{count} files for {engine} in {folder}; README.md there says how to use them":
         "{count} Dateien für {engine} in {folder}; README.md dort sagt, wie man sie benutzt",
@@ -195,8 +257,9 @@ INTERFACE: dict[str, str] = {
     "Cancel Plan": "Planen abbrechen",
     "Stop planning. An earlier plan is kept": "Das Planen anhalten. Ein früherer Plan bleibt erhalten",
     "Apply Plan": "Plan anwenden",
-    "Write the plan's technique and settings to this scene, and its resolutions to the Light Probe Volumes":
-        "Technik und Einstellungen des Plans in diese Szene und seine Auflösungen in die Lichtsondenvolumen schreiben",
+    "Write the plan to this scene: technique, settings, resolutions and left out probes of its volumes, and those within others":
+        "Den Plan in diese Szene schreiben: Technik, Einstellungen, Auflösungen und ausgelassene Sonden seiner Volumen, und solche "
+        "in anderen",
     "Error at Surfaces": "Fehler auf Flächen",
     "Relative error of the light on surfaces that is aimed at": "Angestrebter relativer Fehler des Lichts auf Flächen",
     "Keep Air": "Luft behalten",
@@ -209,7 +272,6 @@ INTERFACE: dict[str, str] = {
     "Planned: {error} at surfaces with {probes:,} probes": "Geplant: {error} auf Flächen mit {probes:,} Sonden",
     "Out of reach; the best there is: {error} at surfaces with {probes:,} probes":
         "Unerreichbar; das Beste ist {error} auf Flächen mit {probes:,} Sonden",
-    "The volume {name} is no longer there: plan again": "Das Volumen {name} ist nicht mehr da: neu planen",
     "Applied: {lattices} probes": "Angewendet: {lattices} Sonden",
     "Error below": "Fehler unter",
     "A plan or a bake is already running": "Es wird schon geplant oder gebacken",
@@ -253,8 +315,16 @@ INTERFACE: dict[str, str] = {
     "How many probes the last bake has, over all volumes": "Wie viele Sonden das zuletzt Gebackene in allen Volumen hat",
     "Share of probes that lie in the open; the others take their light from neighbours":
         "Anteil der Sonden, die frei liegen; die anderen nehmen ihr Licht von Nachbarn",
-    "Estimated relative error of the spherical harmonics against infinitely many rays; negative if unknown":
-        "Geschätzter relativer Fehler der Kugelflächenfunktionen gegenüber unendlich vielen Strahlen; negativ, wenn unbekannt",
+    "Estimated relative error of what probes measured against infinitely many rays; negative if unknown":
+        "Geschätzter relativer Fehler dessen, was Sonden gemessen haben, gegen unendlich viele Strahlen; negativ, wenn unbekannt",
+    "Relative error of the light that surfaces read from probes, at a few points; negative if unknown":
+        "Relativer Fehler des Lichts, das Flächen aus Sonden lesen, an einigen Punkten; negativ, wenn unbekannt",
+    "Error on Surfaces at Least": "Fehler auf Flächen mindestens",
+    "Lower end of the 95% interval of the error on surfaces; negative if unknown":
+        "Unteres Ende des 95-%-Intervalls des Fehlers auf Flächen; negativ, wenn unbekannt",
+    "Error on Surfaces at Most": "Fehler auf Flächen höchstens",
+    "Upper end of the 95% interval of the error on surfaces; negative if unknown":
+        "Oberes Ende des 95-%-Intervalls des Fehlers auf Flächen; negativ, wenn unbekannt",
     "Seconds": "Sekunden",
     "How long the last bake took": "Wie lange das letzte Backen gedauert hat",
 
@@ -266,6 +336,17 @@ INTERFACE: dict[str, str] = {
     "Direct": "Direkt",
     "Indirect": "Indirekt",
     "Irradiance": "Bestrahlungsstärke",
+    "Volume direct": "Volumen direkt",
+    "Volume indirect": "Volumen indirekt",
+    "Volume Direct": "Volumen direkt",
+    "Deliver the light of lamps that media scatter once, and what media give of their own":
+        "Das Licht von Lampen ausgeben, das Medien einmal streuen, und was Medien selbst geben",
+    "Volume Indirect": "Volumen indirekt",
+    "Deliver the light that media scatter after it was scattered or reflected before":
+        "Das Licht ausgeben, das Medien streuen, nachdem es schon einmal gestreut oder zurückgeworfen wurde",
+    "Transmittance": "Durchlässigkeit",
+    "Deliver the share of light that media leave between surfaces and the eye":
+        "Den Anteil des Lichts ausgeben, den Medien zwischen Flächen und Auge übrig lassen",
     "Normal": "Normale",
     "Depth": "Tiefe",
     "Shadow Map": "Schattenkarte",
@@ -278,10 +359,10 @@ INTERFACE: dict[str, str] = {
         "Schattenkarten, die je Bild gezeichnet werden; brauchen die Lampen mehr, bekommt jedes Bild seinen Teil davon",
     "Leave the world out of the picture; it still lights the scene":
         "Die Welt nicht im Bild zeigen; die Szene beleuchtet sie trotzdem",
-    "Spheres where the probes are: in the light that they hold, or coloured by whether they are usable (green), moved (orange) or "
-    "inside geometry (red)":
-        "Kugeln an den Orten der Sonden: in ihrem Licht, oder gefärbt danach, ob sie brauchbar (grün), verschoben (orange) oder in "
-        "Geometrie (rot) sind",
+    "Spheres where the probes are: in the light that they hold, those of sphere probes as mirrors, or coloured by whether they are "
+    "usable (green), moved (orange) or inside geometry (red)":
+        "Kugeln an den Orten der Sonden: in ihrem Licht, die von Kugelsonden als Spiegel, oder gefärbt danach, ob sie brauchbar "
+        "(grün), verschoben (orange) oder in Geometrie (rot) sind",
     "None": "Keine",
     "Validity": "Gültigkeit",
     "Probe Size": "Sondengröße",

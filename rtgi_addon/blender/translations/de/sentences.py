@@ -16,6 +16,11 @@ SENTENCES: dict[str, str] = {
     "resampling to probes": "tastet für die Sonden neu ab",
     "Writing {0}": "Schreibt {0}",
     "Done": "Fertig",
+    "Drawing": "Zeichnet",
+    "{0} % off by its noise, {1} samples a pixel": "durch Rauschen {0} % daneben, {1} Abtastwerte je Pixel",
+    "{0} % off by its noise, {1} % was asked for: allow more samples, {2} samples a pixel":
+        "durch Rauschen {0} % daneben, verlangt waren {1} %: mehr Abtastwerte erlauben, {2} Abtastwerte je Pixel",
+    "Overlays are not drawn over pictures by rays": "Über Bilder durch Strahlen werden keine Überlagerungen gezeichnet",
     "Relighting": "Beleuchtet neu",
     "Sample {0} of {1}": "Abtastwert {0} von {1}",
     "Choosing receivers": "Wählt Empfänger",
@@ -107,20 +112,16 @@ SENTENCES: dict[str, str] = {
     "give at least 1 on each axis": "auf jeder Achse mindestens 1 geben",
     "{0} lies entirely outside the scene": "{0} liegt ganz außerhalb der Szene",
     "move it to where light is to be known": "dorthin rücken, wo Licht bekannt sein soll",
-    "{0} needs about {1} GiB of memory, most of it for {2} ({3}); {4} GiB are free":
-        "{0} braucht etwa {1} GiB Speicher, das meiste für {2} ({3}); {4} GiB sind frei",
+    "{0} needs about {1} of memory, most of it for {2} ({3}); {4} are free":
+        "{0} braucht etwa {1} Speicher, das meiste für {2} ({3}); {4} sind frei",
 
     # Reading a scene.
     "no output folder is set": "kein Ausgabeordner ist gesetzt",
     "choose one in the render properties, under RTGI": "in den Rendereigenschaften unter RTGI einen wählen",
-    "the output folder {0} is relative to this file, which was never saved":
-        "der Ausgabeordner {0} ist relativ zu dieser Datei, die nie gespeichert wurde",
-    "save the file, or choose an absolute folder in the render properties, under RTGI":
-        "die Datei speichern, oder in den Rendereigenschaften unter RTGI einen absoluten Ordner wählen",
     "scene {0} has no camera": "Szene {0} hat keine Kamera",
     "add one, or make one active": "eine hinzufügen oder eine aktiv machen",
     "choose a perspective or orthographic lens": "eine perspektivische oder orthografische Linse wählen",
-    "Cycles cannot render world {0} ({1})": "Cycles kann die Welt {0} nicht rendern ({1})",
+    "Cycles cannot render {0} ({1})": "Cycles kann {0} nicht rendern ({1})",
     "let a running render finish, check that Cycles is installed, then bake again":
         "laufendes Rendern enden lassen, nachsehen, ob Cycles installiert ist, dann neu backen",
     "Blender did not evaluate scene {0} for render": "Blender hat Szene {0} nicht zum Rendern ausgewertet",
@@ -147,35 +148,55 @@ SENTENCES: dict[str, str] = {
     "no Light Probe Volume in the scene: one of {0} × {1} × {2} m with {3} × {4} × {5} = {6} probes was fitted to it":
         "kein Lichtsondenvolumen in der Szene: eines von {0} × {1} × {2} m mit {3} × {4} × {5} = {6} Sonden wurde ihr angepasst",
     "{0} is {1}: it has no surface to bake and is left out": "{0} ist {1}: ohne Fläche zum Backen, es bleibt außen vor",
-    "{0} is invisible to diffuse rays: it is left out, and so is any shadow it casts":
-        "{0} ist für diffuse Strahlen unsichtbar: es bleibt außen vor, und sein Schatten auch",
-    "{0} casts no shadows in Cycles, but does in the bake": "{0} wirft in Cycles keinen Schatten, beim Backen aber schon",
+    "{0} is invisible to diffuse rays, but probes see it: they look as a camera does":
+        "{0} ist für diffuse Strahlen unsichtbar, aber Sonden sehen es: sie schauen wie eine Kamera",
     "{0} has particle hair: it has no surface to bake and is left out":
         "{0} hat Partikelhaar: ohne Fläche zum Backen, es bleibt außen vor",
     "camera {0} is neither perspective nor orthographic: it is left out":
         "Kamera {0} ist weder perspektivisch noch orthografisch: sie bleibt außen vor",
     "lamp {0}: {1}": "Lampe {0}: {1}",
     "lamp {0} is invisible to diffuse rays: it is left out": "Lampe {0} ist für diffuse Strahlen unsichtbar: sie bleibt außen vor",
-    "lamp {0}: light linking is not read, it lights everything":
-        "Lampe {0}: Lichtverknüpfung wird nicht gelesen, sie beleuchtet alles",
     "world: image {0} ({1}) is missing; Blender shows it pink, and so is the world":
         "Welt: das Bild {0} ({1}) fehlt; Blender zeigt es rosa, und so ist die Welt",
     "image '{0}' is missing ({1}): magenta, as in Cycles": "das Bild „{0}“ fehlt ({1}): magenta, wie in Cycles",
     "image '{0}' was averaged from {1}×{2} to {3}×{4} texels": "das Bild „{0}“ wurde von {1}×{2} auf {3}×{4} Texel gemittelt",
     "material '{0}' was read by a Cycles bake, because of {1}": "das Material „{0}“ wurde über Cycles gebacken, wegen {1}",
     "material '{0}': {1}": "Material „{0}“: {1}",
-    "its sheen is left out": "sein Samtglanz bleibt außen vor",
+    "its light and dark are evened out: it reflects as much of even light as in Cycles":
+        "sein Hell und Dunkel wird ausgeglichen: von gleichmäßigem Licht reflektiert es so viel wie in Cycles",
+    "its answer differs with the number of reflections, and is taken as it is after the first":
+        "seine Antwort hängt von der Zahl der Reflexionen ab und gilt überall so wie nach der ersten",
+    "it asks for {0}": "es fragt nach {0}",
+    "it asks for the length of each ray (taken as {0} m)": "es fragt nach der Länge jedes Strahls (gilt als {0} m)",
+    "it asks for the Ambient Occlusion of other objects (taken as none)":
+        "es fragt nach der Umgebungsverdeckung durch andere Objekte (gilt als keine)",
+    "it asks for what is around it by a Raycast node (taken as nothing)":
+        "es fragt durch einen Raycast-Node, was um es herum ist (gilt als nichts)",
+    "the file's working colour space is {0}: all numbers of the bake are in it":
+        "der Arbeitsfarbraum der Datei ist {0}: alle Zahlen der Backung stehen darin",
+    "its light depends on the kind of ray, and Cycles, which also samples it as a lamp, shows only part of it":
+        "sein Licht hängt von der Art des Strahls ab, und Cycles, das es auch als Lampe abtastet, zeigt nur einen Teil davon",
     "its bumps are left out": "seine Unebenheiten bleiben außen vor",
-    "rays pass straight through it, uncoloured, where it transmits":
-        "Strahlen gehen gerade und ungefärbt hindurch, wo es durchlässig ist",
+    "light passes its glass straight on (refraction and caustics are not followed), and that of lamps without a size not at all, "
+    "as in Cycles":
+        "Licht geht gerade durch sein Glas (Brechung und Kaustik werden nicht verfolgt), das von Lampen ohne Größe wie in Cycles "
+        "gar nicht",
     "its rough diffuse reflection (Oren-Nayar) is treated as even in all directions":
         "seine raue diffuse Reflexion (Oren-Nayar) gilt als in alle Richtungen gleich",
-    "its translucency is treated as reflection": "seine Lichtdurchlässigkeit gilt als Reflexion",
-    "what it lets through is not coloured": "was es durchlässt, wird nicht gefärbt",
     "there is no Embree here (the Python package embreex): rays go through Blender's BVH, which makes bakes some {0} times slower, "
     "and more on many cores; {1}":
         "hier ist kein Embree (das Python-Paket embreex): Strahlen gehen durch Blenders BVH, womit Backen etwa {0}-mal so lange "
         "dauert, auf vielen Kernen noch länger; {1}",
+    "there are no compiled kernels here ({0}): numpy does their work, which makes bakes some {1} times slower; {2}":
+        "hier gibt es keine übersetzten Kerne ({0}): numpy tut ihre Arbeit, womit Backen etwa {1}-mal so lange dauert; {2}",
+    "they are switched off": "sie sind abgeschaltet",
+    "the package rtgi_kernels is not there": "das Paket rtgi_kernels ist nicht da",
+    "{0} is of version {1}, not {2}": "{0} hat Version {1}, nicht {2}",
+    "{0} cannot be used ({1})": "{0} lässt sich nicht benutzen ({1})",
+    "Embree's functions cannot be called ({0})": "Embrees Funktionen lassen sich nicht aufrufen ({0})",
+    "Embree's structures are not those that the kernels know": "Embrees Strukturen sind nicht die, die die Kerne kennen",
+    "install the extension's zip made for this system, or run `make setup`":
+        "das ZIP der Erweiterung für dieses System installieren oder `make setup` ausführen",
     "the package does not exist for this system": "für dieses System gibt es das Paket nicht",
     "install the extension's zip made for this system, or that package, and restart Blender":
         "das ZIP der Erweiterung für dieses System oder dieses Paket installieren und Blender neu starten",
@@ -183,6 +204,7 @@ SENTENCES: dict[str, str] = {
     # Settings.
     "unknown technique {0}": "unbekannte Technik {0}",
     "unknown engine {0}": "unbekannte Engine {0}",
+    "unknown effect {0}": "unbekannter Effekt {0}",
     "unknown {0} {1}": "unbekannt: {0} {1}",
     "choose one of {0}": "eines wählen von {0}",
     "give a value from {0} to {1}": "einen Wert von {0} bis {1} geben",
@@ -190,7 +212,11 @@ SENTENCES: dict[str, str] = {
     "give a value from 0 to {0}": "einen Wert von 0 bis {0} geben",
     "give true or false": "true oder false geben",
     "give numbers above 0": "Zahlen über 0 geben",
-    "technique {0} has no setting {1}": "Technik {0} hat keine Einstellung {1}",
+    "{0} {1} has no setting {2}": "{0} {1} hat keine Einstellung {2}",
+    "technique": "Technik",
+    "effect": "Effekt",
+    "give {0} numbers with commas between them": "{0} Zahlen mit Kommas dazwischen geben",
+    "give at least {0}": "mindestens {0} geben",
     "technique {0} does not bake on the device {1}": "Technik {0} backt nicht auf dem Gerät {1}",
     "use --device {0}": "das Gerät {0} nehmen",
     "error is {0}": "error ist {0}",
@@ -203,7 +229,6 @@ SENTENCES: dict[str, str] = {
 
     # Probes.
     "every probe of the volume {0} lies inside geometry": "jede Sonde des Volumens {0} liegt in Geometrie",
-    "move or resize it so that it covers open space": "so rücken oder skalieren, dass es freien Raum umfasst",
     "the surface cache needs more than {0} texels": "der Flächenspeicher braucht mehr als {0} Texel",
     "raise the texel size, or place the probe volumes closer to what they light":
         "die Texelgröße erhöhen, oder die Sondenvolumen näher an das rücken, was sie beleuchten",
@@ -211,9 +236,10 @@ SENTENCES: dict[str, str] = {
         "diese Sonden wurden aus Dateien gelesen, ohne die Treffer ihres Backens",
     "this bake kept no hits to relight": "dieses Backen hat keine Treffer zum Neubeleuchten behalten",
     "bake again to relight them": "zum Neubeleuchten neu backen",
-    "bake again (hits are kept for up to 33 million rays, and not by a resumed bake)":
-        "neu backen (Treffer werden bis 33 Millionen Strahlen behalten, und nicht beim Fortsetzen)",
+    "bake again (hits are kept for up to {0} million rays, and not by a resumed bake)":
+        "neu backen (Treffer werden bis {0} Millionen Strahlen behalten, und nicht beim Fortsetzen)",
     "the scene's {0} changed since the bake": "seit dem Backen hat sich geändert: {0}",
+    "the scene's {0} changed since the bake at {1}": "seit dem Backen hat sich geändert: {0}, an {1}",
     "bake again; relighting follows lamps and world only": "neu backen; Neubeleuchten folgt nur Lampen und Welt",
 
     # Virtual lights, shadow maps and light volumes.
@@ -262,6 +288,18 @@ SENTENCES: dict[str, str] = {
     "move the Light Probe Volume to the geometry": "das Lichtsondenvolumen zur Geometrie rücken",
     "a chart needs seeds, points, normals, probes and a noise above 0":
         "ein Vergleich braucht Startwerte, Punkte, Normalen, Sonden und ein Rauschen über 0",
+    "a chart without techniques and without pictures of effects has nothing to measure":
+        "ein Vergleich ohne Techniken und ohne Bilder mit Effekten hat nichts zu messen",
+    "name a technique": "eine Technik nennen",
+    "the effect {0} draws as nothing looks: no picture says how right it is":
+        "der Effekt {0} zeichnet, wie nichts aussieht: Kein Bild sagt, wie richtig das ist",
+    "choose of {0}": "unter {0} wählen",
+    "{0}, picture {1} of {2}": "{0}, Bild {1} von {2}",
+    "drawing by rays": "Zeichnen mit Strahlen",
+    "Pictures by {0}": "Bilder von {0}",
+    "Cycles' picture, render {0}": "Bild von Cycles, Durchgang {0}",
+    "the camera {0} is no object of the scene of its own": "die Kamera {0} ist kein eigenes Objekt der Szene",
+    "give the scene an active camera": "der Szene eine aktive Kamera geben",
     "mend the scene": "die Szene in Ordnung bringen",
     "{0} does not concern {1}": "{0} betrifft {1} nicht",
     "choose another technique or case": "eine andere Technik oder einen anderen Fall wählen",
@@ -274,59 +312,19 @@ SENTENCES: dict[str, str] = {
 
     "a check holds the bake to indirect light, and --direct adds the lamps'":
         "eine Prüfung hält das Gebackene gegen indirektes Licht, und --direct fügt das der Lampen hinzu",
+    "light on surfaces is off by some {0}, and noise at the probes ({1}) is not why, they lie too far apart: have a finer lattice "
+    "planned (rtgi plan, Plan Bake)":
+        "Licht auf Flächen ist um etwa {0} falsch, und Rauschen an den Sonden ({1}) ist nicht der Grund, sie liegen zu weit "
+        "auseinander: ein feineres Gitter planen lassen (rtgi plan, Backen planen)",
+    "light on surfaces is off by some {0}, and noise at the probes ({1}) is not why, they lie too far apart: fit them to surfaces "
+    "(--fit, Fit to Surfaces), or have a finer lattice planned (rtgi plan, Plan Bake)":
+        "Licht auf Flächen ist um etwa {0} falsch, und Rauschen an den Sonden ({1}) ist nicht der Grund, sie liegen zu weit "
+        "auseinander: sie an Flächen anpassen (--fit, An Flächen anpassen) oder ein feineres Gitter planen lassen (rtgi plan, "
+        "Backen planen)",
+    "fitting probes to surfaces": "Sonden an Flächen anpassen",
     "add --no-check": "--no-check hinzufügen",
-
-    # Files.
-    "the folder {0} does not exist": "den Ordner {0} gibt es nicht",
-    "create it first, or choose another --out": "ihn erst anlegen, oder einen anderen Ausgabeordner wählen",
-    "{0} is a file": "{0} ist eine Datei",
-    "choose a folder as --out": "einen Ordner für die Ausgabe wählen",
-    "{0} holds {1}, which is not part of a bundle": "{0} enthält {1}, das nicht zu Gebackenem gehört",
-    "{0} holds {1}, which is not part of an export for {2}": "{0} enthält {1}, das nicht zu einem Export für {2} gehört",
-    "choose another --out, or move that away: the whole folder is replaced":
-        "einen anderen Ausgabeordner wählen oder das wegräumen: der ganze Ordner wird ersetzt",
-    "{0} would be replaced and is no bundle this version can read, {1}":
-        "{0} würde ersetzt und ist nichts Gebackenes, das diese Version lesen kann, {1}",
-    "choose another --out, or remove that folder": "einen anderen Ausgabeordner wählen oder diesen entfernen",
-    "volume {0}: {1} is not finite at {2} probes, first at {3}":
-        "Volumen {0}: {1} ist bei {2} Sonden nicht endlich, zuerst bei {3}",
-    "look for infinite light strengths in the scene, and report this with the file":
-        "in der Szene nach unendlichen Lichtstärken suchen, und dies mit der Datei melden",
-    "{0} is missing": "{0} fehlt",
-    "{0} is damaged": "{0} ist beschädigt",
-    "{0} is damaged, {1}": "{0} ist beschädigt, {1}",
-    "{0} is damaged, it is not JSON": "{0} ist beschädigt, es ist kein JSON",
-    "{0} is cut short or damaged": "{0} ist abgeschnitten oder beschädigt",
-    "{0} is cut short or damaged, its checksum is not the one in {1}":
-        "{0} ist abgeschnitten oder beschädigt, seine Prüfsumme ist nicht die in {1}",
-    "{0} has channels {1} instead of {2}": "{0} hat die Kanäle {1} statt {2}",
-    "{0} has channels {1} instead of R, G, B": "{0} hat die Kanäle {1} statt R, G, B",
-    "{0} holds values that are not finite": "{0} enthält Werte, die nicht endlich sind",
-    "{0} has the wrong size, {1}": "{0} hat die falsche Größe, {1}",
-    "{0} has schema {1} instead of {2}": "{0} hat das Schema {1} statt {2}",
-    "{0} is not an EXR file": "{0} ist keine EXR-Datei",
-    "{0} was not written by rtgi": "{0} ist nicht von rtgi geschrieben",
-    "{0} was not written by rtgi ({1})": "{0} ist nicht von rtgi geschrieben ({1})",
-    "{0} is not a bundle, it has no {1}": "{0} ist nichts Gebackenes, es hat kein {1}",
-    "there is no bundle at {0}": "bei {0} liegt nichts Gebackenes",
-    "give the folder that `bake --out` wrote": "den Ordner angeben, in den gebacken wurde",
-    "bake again, or use the rtgi that wrote it": "neu backen, oder das rtgi nehmen, das es schrieb",
-    "cannot {0} {1}, {2}{3}": "{1} geht nicht ({0}), {2}{3}",
-    "cannot write {0} ({1})": "{0} kann nicht geschrieben werden ({1})",
-    "cannot write the picture {0} ({1})": "das Bild {0} kann nicht geschrieben werden ({1})",
-    "choose another place or free space": "einen anderen Ort wählen oder Platz schaffen",
-    "cannot make the folder {0} ({1})": "der Ordner {0} kann nicht angelegt werden ({1})",
-    "choose another place for the report": "für den Bericht einen anderen Ort wählen",
-    "{0} is in the way, it is no checkpoint": "{0} ist im Weg und kein Zwischenstand",
-    "move it away or choose another --out": "es wegräumen oder einen anderen Ausgabeordner wählen",
-    "the checkpoint {0} is damaged": "der Zwischenstand {0} ist beschädigt",
-    "bake without --resume to start over": "ohne --resume von vorn backen",
-    "the checkpoint {0} belongs to another bake, changed since: {1}":
-        "der Zwischenstand {0} gehört zu einem anderen Backen, seither geändert: {1}",
-    "undo the change, or bake without --resume to start over": "die Änderung zurücknehmen oder ohne --resume von vorn backen",
-    "a volume of {0} probes does not fit an image of {1} pixels a side":
-        "ein Volumen von {0} Sonden passt nicht in ein Bild von {1} Pixeln je Seite",
-    "lower its resolution or split it into several volumes": "seine Auflösung senken oder es in mehrere Volumen teilen",
+    "the plan is {0}, which has nothing to fit": "der Plan ist {0}, da gibt es nichts anzupassen",
+    "leave out --fit": "--fit weglassen",
 
     # Exports.
     "{0} is brighter than half floats hold ({1} W/(sr m^2))": "{0} ist heller, als halbe Gleitkommazahlen fassen ({1} W/(sr m^2))",
@@ -338,8 +336,6 @@ SENTENCES: dict[str, str] = {
         "{0} Volumen sind mehr als die {1}, für die ein Shader in WebGL Platz hat",
     "bake some of them into a bundle of their own with --volume": "einige davon mit --volume in einen eigenen Ordner backen",
     "bake fewer volumes into this bundle (--volume)": "weniger Volumen in diesen Ordner backen (--volume)",
-    "volume {0} makes a 3D texture of {1} x {2} x {3}, and {4} is the most that every driver has":
-        "Volumen {0} ergibt eine 3D-Textur von {1} x {2} x {3}, und mehr als {4} hat nicht jeder Treiber",
     "no folder is set for the export": "kein Ordner ist für den Export gesetzt",
     "choose one under Export in the sidebar": "in der Seitenleiste unter Export einen wählen",
     "the folder {0} is relative to this file, which was never saved":
@@ -355,8 +351,6 @@ SENTENCES: dict[str, str] = {
     "the model {0} is not glTF Binary": "das Modell {0} ist kein binäres glTF",
     "export glTF Binary from Blender": "binäres glTF aus Blender exportieren",
     "export it again from Blender as .glb": "es neu aus Blender als .glb exportieren",
-    "cannot read the model {0}": "das Modell {0} kann nicht gelesen werden",
-    "correct the path of --model": "seinen Pfad berichtigen",
 
     # The GPU.
     "Blender has a window but no GPU context on this thread": "Blender hat ein Fenster, aber auf diesem Thread keinen GPU-Kontext",
@@ -378,4 +372,10 @@ SENTENCES: dict[str, str] = {
     "keep it below {0}": "unter {0} bleiben",
     "use a lower resolution": "eine niedrigere Auflösung nehmen",
     "use a lower resolution, or --device cpu": "eine niedrigere Auflösung oder das Gerät CPU nehmen",
+    "a check holds the bake to all light as it is, and volume {0} captures other light":
+        "eine Prüfung hält das Gebackene gegen alles Licht, wie es ist, und Volumen {0} nimmt anderes auf",
+    "leaks are found by comparison with all light as it is, and volume {0} captures other light":
+        "Lecks zeigt der Vergleich mit allem Licht, wie es ist, und Volumen {0} nimmt anderes auf",
+    "set its Intensity to 1, let it capture indirect light and emission, and bake again":
+        "seine Intensität auf 1 setzen, es indirektes Licht und Emission aufnehmen lassen und neu backen",
 }

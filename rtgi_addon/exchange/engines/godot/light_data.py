@@ -74,7 +74,8 @@ class LightData:
 
 
 def light_data(volumes: tuple[ExportVolume, ...]) -> LightData:
-    """The capture data of ``volumes``, finest first."""
+    """The capture data of ``volumes``, finest first; of scattered ones on their nodes."""
+    volumes = tuple(volume.on_nodes for volume in volumes)
     points, sh, tetrahedra, planes, children = [], [], [], [], []
     first_point = first_tetrahedron = first_node = 0
     for number, volume in enumerate(volumes):

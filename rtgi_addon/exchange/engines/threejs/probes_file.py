@@ -3,8 +3,11 @@
 The .bin, little-endian, holds all probes first: nine texels of four halves each, the radiance coefficients (r, g, b), and in the
 fourth channel of the first four texels the probe's offset from its lattice point and whether it holds light. Then come the tiles of
 all probes: two unsigned 16-bit numbers a texel, mean and standard deviation of the distance in the volume's own steps. Halves would
-lose what Chebyshev's bound lives on: at a mean of 4 m they are 4 mm apart, and the mean of squares less the square of the mean is
-the difference of two large numbers. Distances are bounded, so fixed point holds both to some hundredths of a millimetre.
+lose what the share that a probe sees lives on: at a mean of 4 m they are 4 mm apart, and the mean of squares less the square of the
+mean is the difference of two large numbers. Distances are bounded, so fixed point holds both to some hundredths of a millimetre.
+
+Last, in floats, come the words of the nodes of scattered volumes, four each (scene/scattered.py): their `resolution` is that of the
+nodes, `probes` how long their list is, and offsets are from the volume's centre.
 """
 
 import json
@@ -12,8 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ....techniques.probes.field import ProbeField
-from ...files import write_atomically
+from ....storage.writing import write_file
 from ...schema import RTGI_VERSION
 from ..base import write_text
 from ..volumes import ExportVolume, to_half
@@ -22,21 +24,23 @@ FORMAT = "rtgi-three/1"
 _STEPS = 65535.0
 
 
-def write_probes(path: Path, field: ProbeField, volumes: tuple[ExportVolume, ...], scene: str) -> None:
-    """Write ``volumes`` of ``field`` as ``path``, a .json, and the .bin beside it.
+def write_probes(path: Path, volumes: tuple[ExportVolume, ...], scene: str, manifest: dict) -> None:
+    """Write ``volumes`` of the bake with this ``manifest`` as ``path``, a .json, and the .bin beside it.
 
     Raises BakeError for light beyond what halves hold, OSError for a disk that refuses.
     """
     tiles = [_tiles(volume) for volume in volumes]
-    data = b"".join([*(_probes(volume).tobytes() for volume in volumes), *(stored.tobytes() for stored, _ in tiles)])
-    path.parent.mkdir(parents=True, exist_ok=True)
+    words = [volume.words.astype("<f4").tobytes() for volume in volumes if volume.words is not None]
+    data = b"".join([*(_probes(volume).tobytes() for volume in volumes), *(stored.tobytes() for stored, _ in tiles), *words])
     binary = path.with_suffix(".bin")
-    write_atomically(binary, data)
+    write_file(binary, data)
     description = {
         "format": FORMAT,
         "generator": f"RTGI {RTGI_VERSION}",
         "scene": scene,
-        "includesDirect": bool(field.includes_direct),
+        "includesDirect": bool(manifest.get("includes_direct")),
+        "lamps": manifest.get("lamps", {}),
+        "objects": manifest.get("objects", {}),
         "data": {"file": binary.name, "bytes": len(data)},
         "volumes": [_entry(volume, step) for volume, (_, step) in zip(volumes, tiles, strict=True)],
     }
@@ -45,7 +49,9 @@ def write_probes(path: Path, field: ProbeField, volumes: tuple[ExportVolume, ...
 
 def _entry(volume: ExportVolume, distance_step: float) -> dict:
     """A volume as the loader reads it; matrices column by column, as ``Matrix4.fromArray`` takes them."""
-    return {"name": volume.name, "resolution": [int(count) for count in volume.resolution], "centre": volume.centre.tolist(),
+    scattered = {} if volume.words is None else {"probes": int(volume.live.size)}
+    return {"name": volume.name, "resolution": [int(count) for count in volume.nodes], **scattered,
+            "centre": volume.centre.tolist(),
             "worldFromLocal": volume.world_from_local.T.ravel().tolist(),
             "latticeFromOffset": volume.lattice_from_offset.T.ravel().tolist(),
             "normalBias": volume.bias, "tile": volume.tile, "distanceStep": distance_step}

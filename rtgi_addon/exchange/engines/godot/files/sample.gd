@@ -2,6 +2,7 @@ extends Node3D
 ## model.glb under the probes' light, or white balls at the probes where there is no model; a dynamic ball flies through.
 
 const MODEL := "res://model.glb"
+const SKY := "res://sky.exr"
 const MOST_BALLS := 512
 
 @onready var probes: Node3D = $Probes
@@ -14,16 +15,20 @@ func _ready() -> void:
 	if ResourceLoader.exists(MODEL):
 		var model: Node = (load(MODEL) as PackedScene).instantiate()
 		add_child(model)
+		var lamps := _by_node(index["lamps"])
 		for lamp: Light3D in model.find_children("*", "Light3D", true, false):
-			if index["includes_direct"]:
-				lamp.queue_free()  # the probes hold what such lamps give
-			else:
-				_set_up(lamp)
+			_set_up(lamp, lamps.get(lamp.name, "all" if index["includes_direct"] and lamps.is_empty() else "bounces"))
+		var objects := _by_node(index["objects"])
+		for mesh: MeshInstance3D in model.find_children("*", "MeshInstance3D", true, false):
+			if objects.get(mesh.name) == "dynamic":
+				mesh.gi_mode = GeometryInstance3D.GI_MODE_DYNAMIC  # it receives light, and the bake does not know it
 		for camera: Camera3D in model.find_children("*", "Camera3D", true, false):
 			camera.make_current()
 			break
 	else:
 		_add_balls()
+	if ResourceLoader.exists(SKY):
+		_show_sky(load(SKY) as Texture2D)
 	var finest: Vector3 = probes.volumes.volumes[0].offset_from_lattice.basis.get_scale().abs()
 	$Ball.scale = Vector3.ONE * minf(finest.x, minf(finest.y, finest.z))
 	if get_viewport().get_camera_3d() == $Camera:
@@ -43,8 +48,31 @@ func _process(_delta: float) -> void:
 		$Ball.position = _path[leg].lerp(_path[(leg + 1) % _path.size()], smoothstep(0.0, 1.0, fposmod(time, 1.0)))
 
 
-## glTF's watts per steradian and per square metre, as Blender's exporter writes them, in Godot's unit; with shadows.
-func _set_up(lamp: Light3D) -> void:
+## Behind the model alone: the probes hold its light.
+func _show_sky(panorama: Texture2D) -> void:
+	var material := PanoramaSkyMaterial.new()
+	material.panorama = panorama
+	var environment: Environment = $Environment.environment
+	environment.sky = Sky.new()
+	environment.sky.sky_material = material
+	environment.background_mode = Environment.BG_SKY
+
+
+## What the bake says of Blender's objects, by the names of the nodes that they became.
+func _by_node(roles: Dictionary) -> Dictionary:
+	var result := {}
+	for blender_name: String in roles:
+		result[StringName(blender_name.validate_node_name())] = roles[blender_name]
+	return result
+
+
+## glTF's watts per steradian and per square metre, as Blender's exporter writes them, in Godot's unit; with shadows. What the probes
+## hold of a lamp is not given twice.
+func _set_up(lamp: Light3D, baked: String) -> void:
+	if baked == "all":
+		lamp.queue_free()
+		return
+	lamp.light_bake_mode = Light3D.BAKE_DISABLED if baked == "none" else Light3D.BAKE_DYNAMIC
 	lamp.light_energy /= PI
 	lamp.shadow_enabled = true
 	if lamp is OmniLight3D or lamp is SpotLight3D:

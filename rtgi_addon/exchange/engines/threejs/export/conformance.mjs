@@ -1,7 +1,7 @@
 // Holds the loader's look-up on the CPU to RTGI's own numbers: `npm install`, then `node conformance.mjs`. Exit code 1 if it fails.
 
 import { readFile } from 'node:fs/promises';
-import { Euler, SphericalHarmonics3, Vector3 } from 'three';
+import { Color, Euler, SphericalHarmonics3, Vector3 } from 'three';
 import { compare, readKit, summary } from './conformance/compare.js';
 import { RTGIProbeLoader } from './rtgi/RTGIProbeVolumes.js';
 
@@ -10,8 +10,8 @@ async function read(name, type) {
   return type === 'json' ? JSON.parse(content) : content.buffer.slice(content.byteOffset, content.byteOffset + content.byteLength);
 }
 
-function irradiance(probes, points, normals) {
-  return points.map((point, i) => probes.irradiance(point, normals[i]).toArray());
+function irradiance(probes, points, normals, surfaceNormals) {
+  return points.map((point, i) => probes.irradiance(point, normals[i], new Color(), surfaceNormals[i]).toArray());
 }
 
 // The light probe's way: coefficients at a point, then what three's shader makes of them.
@@ -30,8 +30,9 @@ const results = [];
 function check(label, expected, volumes, ask) {
   const { matrixWorld } = volumes;
   const points = expected.points.map((point) => new Vector3(...point).applyMatrix4(matrixWorld));
-  const normals = expected.normals.map((normal) => new Vector3(...normal).transformDirection(matrixWorld));
-  results.push(compare(label, expected, ask(volumes, points, normals)));
+  const [normals, surfaceNormals] = [expected.normals, expected.surface_normals]
+    .map((vectors) => vectors.map((vector) => new Vector3(...vector).transformDirection(matrixWorld)));
+  results.push(compare(label, expected, ask(volumes, points, normals, surfaceNormals)));
 }
 
 cases.forEach((expected) => check(expected.name, expected, probes[expected.volumes], irradiance));

@@ -2,6 +2,7 @@
 
 import * as THREE from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
+import { EXRLoader } from 'three/addons/loaders/EXRLoader.js';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 import { RTGIProbeLoader } from './rtgi/RTGIProbeVolumes.js';
 
@@ -12,9 +13,39 @@ document.body.append(renderer.domElement);
 const scene = new THREE.Scene();
 
 const demo = await (await fetch('demo.json')).json();
-const probes = await new RTGIProbeLoader().loadAsync('probes.json');
+const probes = await new RTGIProbeLoader().loadAsync('rtgi/probes.json');
 const gltf = demo.model ? await new GLTFLoader().loadAsync(demo.model) : null;
 scene.add(probes);
+if (demo.spheres) {
+  const { loadSpheres } = await import('./rtgi/RTGISpheres.js');
+  probes.addMirrors(await loadSpheres(demo.spheres));
+}
+if (demo.atlas) {
+  const { loadAtlas } = await import('./rtgi/RTGIAtlas.js');
+  probes.addAtlas(await loadAtlas(demo.atlas));
+}
+let view = null;
+if (demo.media) {
+  const { RTGIMediaView, loadMedia } = await import('./rtgi/RTGIMedia.js');
+  view = new RTGIMediaView(await loadMedia(demo.media));
+}
+let style = null, styleView = null;
+if (demo.style) {
+  const { RTGIStyleView, loadStyle } = await import('./rtgi/RTGIStyle.js');
+  style = await loadStyle(demo.style);
+  styleView = new RTGIStyleView(style);
+}
+if (demo.sky) {
+  // Behind the model alone: the probes hold its light.
+  scene.background = await new EXRLoader().loadAsync(demo.sky);
+  scene.background.mapping = THREE.EquirectangularReflectionMapping;
+}
+
+let relight = null;
+if (demo.relight) {
+  const { loadRelight } = await import('./rtgi/RTGIRelight.js');
+  relight = await loadRelight(demo.relight, probes);
+}
 
 const bounds = new THREE.Box3();
 const cellSizes = [];
@@ -47,7 +78,7 @@ function makeFloor() {
 
 // Lamps of the model: already in the probes, or ours to draw, with shadows.
 function prepareLamp(light, radius) {
-  light.visible = !probes.includesDirect;
+  light.visible = !probes.holdsDirect(light);
   light.castShadow = Boolean(light.shadow);
   if (light.isDirectionalLight) {
     const centre = bounds.getCenter(new THREE.Vector3());
@@ -83,6 +114,7 @@ if (gltf) {
   scene.add(makeFloor());
 }
 probes.apply(scene);
+style?.apply(scene);
 
 // The model's own camera, else one that sees all.
 const camera = new THREE.PerspectiveCamera(45, 1);
@@ -126,8 +158,13 @@ function draw() {
     waiting = true;
     requestAnimationFrame(() => {
       waiting = false;
-      renderer.render(scene, camera);
+      const followed = relight?.update(renderer) ?? true;
+      const plain = () => view ? view.render(renderer, scene, camera) : renderer.render(scene, camera);
+      styleView ? styleView.render(renderer, scene, camera, plain) : plain();
       document.documentElement.dataset.state = 'ready';
+      if (!followed) {
+        draw();
+      }
     });
   }
 }
@@ -142,6 +179,10 @@ form.oninput = () => {
   balls.visible = showBalls.checked;
   draw();
 };
+if (relight) {
+  const { addDay } = await import('./day.js');
+  addDay({ THREE, form, scene, relight, bounds, model: gltf?.scene, draw });
+}
 form.oninput();
 document.getElementById('info').textContent = probes.volumes
   .map(({ name, resolution }) => `${name}: ${resolution.join(' x ')} probes`).join('; ');
@@ -162,4 +203,4 @@ resize();
 controls.addEventListener('change', draw);
 document.getElementById('message').textContent = '';
 // For the browser's console.
-window.rtgi = { THREE, scene, camera, renderer, probes, balls, draw };
+window.rtgi = { THREE, scene, camera, renderer, probes, relight, balls, view, draw };

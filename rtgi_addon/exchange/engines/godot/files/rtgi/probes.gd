@@ -22,7 +22,11 @@ const DOUBLE_SIDED := preload("surface_double_sided.gdshader")
 			refresh()
 
 var volumes := Volumes.new()
-var _converted := {}  # BaseMaterial3D -> the ShaderMaterial that stands in for it
+## The sphere probes (spheres.gd), or null where the bake has none.
+var spheres: RefCounted
+## The light atlas (atlas.gd), or null where the bake has none. Objects in it that have materials of their own shaders keep those.
+var atlas: RefCounted
+var _converted := {}  # [BaseMaterial3D, part of the atlas] -> the ShaderMaterial that stands in for it
 var _shown: Array[ShaderMaterial] = []  # every material that was given the uniforms
 var _turned: LightmapGIData
 var _turned_instance: RID
@@ -42,9 +46,18 @@ func _exit_tree() -> void:
 
 
 func _ready() -> void:
-	if volumes.open((get_script() as Script).resource_path.get_base_dir()) != OK:
+	var folder := (get_script() as Script).resource_path.get_base_dir()
+	if volumes.open(folder) != OK:
 		return
 	volumes.world_from_local = global_transform
+	if ResourceLoader.exists(folder.path_join("spheres.gd")):
+		spheres = load(folder.path_join("spheres.gd")).new()
+		if spheres.open(folder) != OK:
+			spheres = null
+	if ResourceLoader.exists(folder.path_join("atlas.gd")):
+		atlas = load(folder.path_join("atlas.gd")).new()
+		if atlas.open(folder) != OK:
+			atlas = null
 	set_notify_transform(true)
 	get_tree().node_added.connect(_on_node_added)
 	refresh()
@@ -58,7 +71,7 @@ func _notification(what: int) -> void:
 			_place_light.call_deferred()
 		volumes.world_from_local = global_transform
 		for material in _shown:
-			volumes.apply_to(material)
+			_set_up(material)
 
 
 ## Dynamic objects are lit by the child node, which follows this one; where it is turned, by a turned copy of its light.
@@ -79,6 +92,25 @@ func _free_turned() -> void:
 	if _turned != null:
 		RenderingServer.free_rid(_turned_instance)
 		_turned = null
+
+
+## Gives materials the uniforms again, after the textures of `volumes` were replaced.
+func show_volumes() -> void:
+	for material in _shown:
+		volumes.apply_to(material)
+
+
+## Gives dynamic objects the light that `volumes` now hold for scripts.
+func show_harmonics() -> void:
+	var node := get_node_or_null(^"DynamicObjects") as LightmapGI
+	if node == null or node.light_data == null:
+		return
+	var content: Dictionary = node.light_data.get("probe_data").duplicate()
+	content["sh"] = volumes.light_data_harmonics()
+	var data := LightmapGIData.new()
+	data.set("probe_data", content)
+	node.light_data = data
+	_place_light()
 
 
 ## Looks for meshes and materials again: call it after materials were replaced.
@@ -107,7 +139,7 @@ func _light(mesh: MeshInstance3D) -> void:
 		if material is ShaderMaterial:
 			_show(material)
 			continue
-		var stand_in := _stand_in(material)
+		var stand_in := _stand_in(material, "" if atlas == null else atlas.part_of(mesh))
 		if stand_in == null:
 			continue
 		_drawn_otherwise[mesh] = true
@@ -138,16 +170,17 @@ func _show(material: ShaderMaterial) -> void:
 		for uniform in material.shader.get_shader_uniform_list():
 			if uniform["name"] == "rtgi_ready":
 				_shown.append(material)
-				volumes.apply_to(material)
+				_set_up(material)
 				return
 
 
-## The material that is drawn for a StandardMaterial3D or ORMMaterial3D (none: the engine's default), or null to leave it alone.
-func _stand_in(material: Material) -> ShaderMaterial:
+## The material that is drawn for a StandardMaterial3D or ORMMaterial3D (none: the engine's default), or null to leave it alone;
+## objects in the light atlas have one of their own.
+func _stand_in(material: Material, part: String) -> ShaderMaterial:
 	if not convert_materials:
 		return null
-	if _converted.has(material):
-		return _converted[material]
+	if _converted.has([material, part]):
+		return _converted[[material, part]]
 	var source := material as BaseMaterial3D
 	if material != null and (source == null or source.transparency != BaseMaterial3D.TRANSPARENCY_DISABLED
 			or source.shading_mode == BaseMaterial3D.SHADING_MODE_UNSHADED):
@@ -178,10 +211,22 @@ func _stand_in(material: Material) -> ShaderMaterial:
 	for parameter: String in parameters:
 		if parameters[parameter] != null:
 			result.set_shader_parameter(parameter, parameters[parameter])
-	_converted[material] = result
+	_converted[[material, part]] = result
+	if part != "":
+		result.set_meta(&"rtgi_part", part)
 	_shown.append(result)
-	volumes.apply_to(result)
+	_set_up(result)
 	return result
+
+
+func _set_up(material: ShaderMaterial) -> void:
+	volumes.apply_to(material)
+	if spheres != null:
+		spheres.world_from_local = global_transform
+		spheres.apply_to(material)
+	if atlas != null and material.has_meta(&"rtgi_part"):
+		atlas.world_from_local = global_transform
+		atlas.apply_to(material, material.get_meta(&"rtgi_part"))
 
 
 static func _channel(channel: BaseMaterial3D.TextureChannel) -> Vector4:

@@ -2,6 +2,21 @@
 extends RefCounted
 ## RTGI's probe volumes: their textures, the uniforms of irradiance.gdshaderinc, and the same lookup for scripts.
 
+# The numbers of irradiance.gdshaderinc.
+const SIDE_FLOOR := 0.2
+const CRUSH_BELOW := 0.2
+const UNSEEN_FLOOR := 1e-4
+const DILATED_FLOOR := 1e-12
+const LIFT := 0.2
+const AT_PROBE := 1e-6
+const TINY := 1.17549435e-38
+const WORD := 256
+const SHARES := 255
+const COSINE_0 := 0.886226925
+const COSINE_1 := 1.02332671
+const COSINE_2 := 0.858085531
+const COSINE_2_ZONAL := 0.247707956
+
 ## Where the probes' own axes lie in the world; the lookup follows it.
 var world_from_local := Transform3D.IDENTITY
 ## One of each volume, finest first.
@@ -10,12 +25,17 @@ var volumes: Array[Volume] = []
 
 class Volume:
 	var name: String
-	var size: Vector4i  ## resolution x, y, z and side of a tile
+	var size: Vector4i  ## resolution x, y, z of the probes as they lie in textures, and side of a tile
+	var nodes: Vector3i  ## of what is looked up: the probes themselves, or what names scattered ones
+	var names: Texture3D  ## what the nodes of a scattered volume name; else null
+	var words: PackedColorArray  ## the same, for scripts
 	var centre: Vector3
 	var bias: float
 	var lattice_from_offset: Transform3D
 	var offset_from_lattice: Transform3D
 	var probes: Texture3D
+	var shown: Texture2D  ## what is drawn with where light changes at run time: the slices of `probes` side by side, as in the file
+	var sheet: Vector2i  ## its size
 	var distances: Texture3D
 	var places: PackedColorArray  ## per probe: from lattice point to probe, 1 if it holds light
 	var harmonics: PackedVector3Array  ## per probe: nine SH of radiance
@@ -38,6 +58,13 @@ func open(folder: String) -> Error:
 		var resolution: Array = entry["resolution"]
 		volume.name = entry["name"]
 		volume.size = Vector4i(resolution[0], resolution[1], resolution[2], entry["tile"])
+		volume.nodes = Vector3i(resolution[0], resolution[1], resolution[2])
+		if entry.has("words"):
+			volume.nodes = Vector3i(entry["nodes"][0], entry["nodes"][1], entry["nodes"][2])
+			volume.names = load(folder.path_join(entry["words"])) as Texture3D
+			if volume.names == null:
+				push_error("RTGI: the nodes of volume %s in %s are not imported as Texture3D" % [volume.name, folder])
+				return ERR_FILE_MISSING_DEPENDENCIES
 		volume.centre = Vector3(entry["centre"][0], entry["centre"][1], entry["centre"][2])
 		volume.bias = entry["bias"]
 		volume.lattice_from_offset = _transform(entry["lattice_from_offset"])
@@ -47,8 +74,30 @@ func open(folder: String) -> Error:
 		if volume.probes == null or volume.distances == null:
 			push_error("RTGI: the textures of volume %s in %s are not imported as Texture3D" % [volume.name, folder])
 			return ERR_FILE_MISSING_DEPENDENCIES
+		if entry.has("sheet"):
+			volume.sheet = Vector2i(entry["sheet"][0], entry["sheet"][1])
+			volume.shown = _sheet(volume)
 		volumes.append(volume)
 	return OK
+
+
+## The probes as a picture, for exports whose light can change (relight.gd).
+static func _sheet(volume: Volume) -> ImageTexture:
+	var sheet := Image.create_empty(volume.sheet.x, volume.sheet.y, false, Image.FORMAT_RGBAH)
+	var slices := slices_of(volume.probes)
+	var columns := volume.sheet.x / volume.size.x
+	for number in slices.size():
+		sheet.blit_rect(slices[number], Rect2i(0, 0, volume.size.x, volume.size.y),
+				Vector2i(number % columns * volume.size.x, number / columns * volume.size.y))
+	return ImageTexture.create_from_image(sheet)
+
+
+## Nine harmonics of each probe, by volume, in place of those that were baked, for scripts.
+func replace_harmonics(of_volumes: Array[PackedVector3Array]) -> void:
+	for number in volumes.size():
+		if volumes[number].places.is_empty():
+			_read_back(volumes[number])
+		volumes[number].harmonics = of_volumes[number]
 
 
 ## Sets the uniforms of [param material], whose shader includes irradiance.gdshaderinc.
@@ -56,21 +105,27 @@ func apply_to(material: ShaderMaterial) -> void:
 	material.set_shader_parameter("rtgi_local_from_world", Projection(world_from_local.affine_inverse()))
 	for number in volumes.size():
 		var volume := volumes[number]
-		material.set_shader_parameter("rtgi_probes_%d" % number, volume.probes)
+		material.set_shader_parameter("rtgi_probes_%d" % number, volume.probes if volume.shown == null else volume.shown)
 		material.set_shader_parameter("rtgi_distances_%d" % number, volume.distances)
 		material.set_shader_parameter("rtgi_lattice_from_offset_%d" % number, Projection(volume.lattice_from_offset))
 		material.set_shader_parameter("rtgi_offset_from_lattice_%d" % number, Projection(volume.offset_from_lattice))
 		material.set_shader_parameter("rtgi_centre_%d" % number,
 				Vector4(volume.centre.x, volume.centre.y, volume.centre.z, volume.bias))
 		material.set_shader_parameter("rtgi_size_%d" % number, volume.size)
+		material.set_shader_parameter("rtgi_nodes_%d" % number,
+				Vector4i(volume.nodes.x, volume.nodes.y, volume.nodes.z, 0 if volume.names == null else 1))
+		if volume.names != null:
+			material.set_shader_parameter("rtgi_words_%d" % number, volume.names)
 	material.set_shader_parameter("rtgi_ready", not volumes.is_empty())
 
 
-## Irradiance [W/m^2] at a point of a surface; the first call reads the textures back.
-func irradiance(position_world: Vector3, normal_world: Vector3) -> Vector3:
+## Irradiance [W/m^2] at a point of a surface; the first call reads the textures back. Where [param normal_world] is that of a normal
+## map, [param surface_normal_world] is the surface's own; left out, they are one.
+func irradiance(position_world: Vector3, normal_world: Vector3, surface_normal_world := Vector3.ZERO) -> Vector3:
 	var local_from_world := world_from_local.affine_inverse()
 	var position := local_from_world * position_world
 	var normal := (local_from_world.basis * normal_world).normalized()
+	var surface_normal := (local_from_world.basis * surface_normal_world).normalized() if surface_normal_world else normal
 	var shares: PackedFloat64Array = []
 	var total := 0.0
 	var left := 1.0
@@ -93,25 +148,20 @@ func irradiance(position_world: Vector3, normal_world: Vector3) -> Vector3:
 	var sum := Vector3.ZERO
 	for number in volumes.size():
 		if shares[number] > 0.0:
-			sum += shares[number] / total * _volume_irradiance(volumes[number], position - volumes[number].centre, normal)
+			sum += shares[number] / total * _volume_irradiance(volumes[number], position - volumes[number].centre, normal, surface_normal)
 	return sum
 
 
-func _volume_irradiance(volume: Volume, offset: Vector3, normal: Vector3) -> Vector3:
+func _volume_irradiance(volume: Volume, offset: Vector3, normal: Vector3, surface_normal: Vector3) -> Vector3:
 	if volume.places.is_empty():
 		_read_back(volume)
-	var n := normal
-	# Bands of the clamped cosine, times the basis.
-	var basis: PackedFloat64Array = [
-		0.88622693, 1.02332671 * n.y, 1.02332671 * n.z, 1.02332671 * n.x,
-		0.85808553 * n.x * n.y, 0.85808553 * n.y * n.z, 0.74312387 * n.z * n.z - 0.24770796, 0.85808553 * n.x * n.z,
-		0.42904276 * (n.x + n.y) * (n.x - n.y),
-	]
-	var last := Vector3i(volume.size.x, volume.size.y, volume.size.z) - Vector3i.ONE
-	var position := (volume.lattice_from_offset * offset).clamp(Vector3.ZERO, Vector3(last))
+	var basis := _cosine_basis(normal)
+	var last := volume.nodes - Vector3i.ONE
+	var lifted := offset + LIFT * volume.bias * surface_normal
+	var position := (volume.lattice_from_offset * lifted).clamp(Vector3.ZERO, Vector3(last))
 	var first := Vector3i(position).min((last - Vector3i.ONE).max(Vector3i.ZERO))
 	var f := position - Vector3(first)
-	var biased := offset + volume.bias * normal
+	var biased := offset + volume.bias * surface_normal
 	var sum := Vector3.ZERO
 	var total := 0.0
 	for corner in 8:
@@ -121,40 +171,91 @@ func _volume_irradiance(volume: Volume, offset: Vector3, normal: Vector3) -> Vec
 		var trilinear := along.x * along.y * along.z
 		if trilinear == 0.0:
 			continue
-		var index := (cell.z * volume.size.y + cell.y) * volume.size.x + cell.x
-		var place := volume.places[index]
-		var probe := volume.offset_from_lattice * Vector3(cell) + Vector3(place.r, place.g, place.b)
-		var towards := probe - offset
-		var distance := towards.length()
-		var wrapped := 0.5 * ((towards.dot(normal) / distance if distance > 0.0 else 1.0) + 1.0)
-		var seen := (wrapped * wrapped + 0.2) * _visibility(volume, cell, biased - probe)
-		if seen < 0.2:
-			seen = seen * seen * seen / 0.04
-		var weight := trilinear * ((seen + 1e-4 if place.a != 0.0 else 0.0) + 1e-12)
-		total += weight
-		for band in 9:
-			sum += weight * basis[band] * volume.harmonics[index * 9 + band]
+		var node := (cell.z * volume.nodes.y + cell.y) * volume.nodes.x + cell.x
+		var origin := volume.offset_from_lattice * Vector3(cell) if volume.names == null else Vector3.ZERO
+		for named: Array in _named(volume, node):
+			var index: int = named[0]
+			var place := volume.places[index]
+			var probe := origin + Vector3(place.r, place.g, place.b)
+			var seen := _side_weight(probe - offset, surface_normal) * _visibility(volume, index, biased - probe)
+			var weight := _probe_weight(trilinear * named[1], seen, named[2] and place.a != 0.0)
+			total += weight
+			for band in 9:
+				sum += weight * basis[band] * volume.harmonics[index * 9 + band]
 	return (sum / total).max(Vector3.ZERO)
 
 
-func _visibility(volume: Volume, cell: Vector3i, offset: Vector3) -> float:
+## What a node names: of each probe its index, its share, and whether it is meant and does not stand in for others.
+static func _named(volume: Volume, node: int) -> Array[Array]:
+	if volume.names == null:
+		return [[node, 1.0, true]]
+	var found: Array[Array] = []
+	for slot in 4:
+		var word := int(volume.words[node][slot])
+		if word != 0:
+			found.append([absi(word) / WORD, float(absi(word) % WORD) / SHARES, word > 0])
+	return found
+
+
+## What light_data.tres holds of the probes: nine colours of radiance over pi for each of its points, which are the probes and once
+## more the outermost ones on the faces of the box.
+func light_data_harmonics() -> PackedColorArray:
+	var result := PackedColorArray()
+	for volume in volumes:
+		var size := volume.nodes
+		for z in size.z + 2:
+			for y in size.y + 2:
+				for x in size.x + 2:
+					var cell := (Vector3i(x, y, z) - Vector3i.ONE).clamp(Vector3i.ZERO, size - Vector3i.ONE)
+					var named := _named(volume, (cell.z * size.y + cell.y) * size.x + cell.x)
+					for band in 9:
+						var value := Vector3.ZERO
+						for one: Array in named:
+							value += one[1] * volume.harmonics[9 * one[0] + band] / PI
+						result.append(Color(value.x, value.y, value.z))
+	return result
+
+
+## How surely the probe [param index] sees the point at [param offset] from it.
+func _visibility(volume: Volume, index: int, offset: Vector3) -> float:
+	var cell := Vector3i(index % volume.size.x, index / volume.size.x % volume.size.y, index / (volume.size.x * volume.size.y))
 	var tile := volume.size.w
 	var distance := offset.length()
-	if distance <= 1e-6 * volume.bias:
-		offset = Vector3.UP
-	var position := (_octahedral(offset) + Vector2.ONE) * (0.5 * tile) + Vector2(0.5, 0.5)
+	var direction := Vector3.UP if distance <= AT_PROBE * volume.bias else offset
+	var position := (_octahedral(direction) + Vector2.ONE) * (0.5 * tile) + Vector2(0.5, 0.5)
 	var low := Vector2i(position).clamp(Vector2i.ZERO, Vector2i(tile, tile))
 	var f := position - Vector2(low)
 	var texel := (cell.z * volume.rows + cell.y * (tile + 2) + low.y) * volume.row_length + cell.x * (tile + 2) + low.x
 	var below := volume.moments[texel].lerp(volume.moments[texel + 1], f.x)
 	var above := volume.moments[texel + volume.row_length].lerp(volume.moments[texel + volume.row_length + 1], f.x)
-	var blended := below.lerp(above, f.y)
-	var behind := distance - blended.x
-	if behind <= 0.0:
-		return 1.0
-	var variance := absf(blended.y - blended.x * blended.x)
-	var bound := variance / maxf(variance + behind * behind, 1.1754944e-38)
-	return bound * bound * bound
+	return _seen_share(distance, below.lerp(above, f.y))
+
+
+# From here on the functions of irradiance.gdshaderinc, which says what they are.
+static func _seen_share(distance: float, moments: Vector2) -> float:
+	var behind := distance - moments.x
+	var variance := absf(moments.y - moments.x * moments.x)
+	var share := 0.5 - 0.5 * behind / sqrt(maxf(variance + behind * behind, TINY))
+	return share * share
+
+
+static func _side_weight(towards_probe: Vector3, surface_normal: Vector3) -> float:
+	var distance := towards_probe.length()
+	var wrapped := 0.5 * ((towards_probe.dot(surface_normal) / distance if distance > 0.0 else 1.0) + 1.0)
+	return wrapped * wrapped + SIDE_FLOOR
+
+
+static func _probe_weight(trilinear: float, seen: float, live: bool) -> float:
+	var crushed := seen * seen * seen / (CRUSH_BELOW * CRUSH_BELOW) if seen < CRUSH_BELOW else seen
+	return trilinear * ((crushed + UNSEEN_FLOOR if live else 0.0) + DILATED_FLOOR)
+
+
+static func _cosine_basis(n: Vector3) -> PackedFloat64Array:
+	return [
+		COSINE_0, COSINE_1 * n.y, COSINE_1 * n.z, COSINE_1 * n.x,
+		COSINE_2 * n.x * n.y, COSINE_2 * n.y * n.z, COSINE_2_ZONAL * (3.0 * n.z * n.z - 1.0), COSINE_2 * n.x * n.z,
+		0.5 * COSINE_2 * (n.x + n.y) * (n.x - n.y),
+	]
 
 
 static func _octahedral(direction: Vector3) -> Vector2:
@@ -168,13 +269,13 @@ static func _octahedral(direction: Vector3) -> Vector2:
 static func _coverage(volume: Volume, lattice: Vector3) -> float:
 	var covered := 1.0
 	for axis in 3:
-		var count: int = volume.size[axis]
+		var count: int = volume.nodes[axis]
 		covered = minf(covered, minf(lattice[axis] + 0.5, count - 0.5 - lattice[axis]) / minf(0.5 * count, 1.0))
 	return clampf(covered, 0.0, 1.0)
 
 
 static func _distance(volume: Volume, lattice: Vector3) -> float:
-	var high := Vector3(volume.size.x, volume.size.y, volume.size.z) - Vector3(0.5, 0.5, 0.5)
+	var high := Vector3(volume.nodes) - Vector3(0.5, 0.5, 0.5)
 	return (volume.offset_from_lattice.basis * (lattice.clamp(Vector3(-0.5, -0.5, -0.5), high) - lattice)).length()
 
 
@@ -198,6 +299,12 @@ static func _read_back(volume: Volume) -> void:
 				var ninth := slices[7 * count.z + z].get_pixel(x, y)
 				volume.harmonics[index * 9 + 8] = Vector3(ninth.r, ninth.g, ninth.b)
 				index += 1
+	if volume.names != null:
+		volume.words.clear()
+		for slice in slices_of(volume.names):
+			for row in slice.get_height():
+				for column in slice.get_width():
+					volume.words.append(slice.get_pixel(column, row))
 	slices = slices_of(volume.distances)
 	volume.row_length = slices[0].get_width()
 	volume.rows = slices[0].get_height()
@@ -207,6 +314,24 @@ static func _read_back(volume: Volume) -> void:
 			for column in volume.row_length:
 				var moment := slices[z].get_pixel(column, row)
 				volume.moments.append(Vector2(moment.r, moment.g))
+
+
+## What the file [param name] of [param folder] says; empty, with an error, where it is missing.
+static func index_of(folder: String, name: String, remedy := "export again") -> Dictionary:
+	var path := folder.path_join(name)
+	var index: Variant = JSON.parse_string(FileAccess.get_file_as_string(path))
+	if index is Dictionary:
+		return index
+	push_error("RTGI: %s is missing or damaged: %s" % [path, remedy])
+	return {}
+
+
+## The texture [param name] of [param folder]; null, with an error, where it is not imported.
+static func texture_of(folder: String, name: String) -> Texture3D:
+	var texture := load(folder.path_join(name)) as Texture3D
+	if texture == null:
+		push_error("RTGI: %s is not imported as Texture3D" % folder.path_join(name))
+	return texture
 
 
 ## The slices of an imported texture, from the imported file: without a rendering driver (--headless) Godot keeps none, and the

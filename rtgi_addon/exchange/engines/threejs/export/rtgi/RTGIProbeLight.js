@@ -1,5 +1,5 @@
 // The probes as a light for WebGPURenderer (three r187 or later) and its WebGL 2 backend: shader.js once more, in three's own
-// shading language. As every light it lights all materials of its scene, so nothing is applied to them:
+// shading language, with the numbers of lookup.js. As every light it lights all materials of its scene, so nothing is applied to them:
 //
 //   scene.add(probes, new RTGIProbeLight(probes));
 
@@ -7,12 +7,15 @@ import {
   AnalyticLightNode, DataTexture, FloatType, Light, NearestFilter, NodeUpdateType, PhysicalLightingModel, RGBAFormat, Vector4,
 } from 'three/webgpu';
 import {
-  Fn, If, Loop, array, float, int, ivec2, ivec3, length, mat4, max, min, mix, normalWorld, normalWorldGeometry, normalize,
-  positionWorld, renderGroup, select, texture, uniform, uniformArray, vec2, vec3, vec4,
+  Fn, If, Loop, array, bool, float, frontFacing, int, ivec2, ivec3, length, mat4, max, min, mix, normalWorld, normalWorldGeometry,
+  normalize, positionWorld, renderGroup, select, sqrt, texture, uniform, uniformArray, vec2, vec3, vec4,
 } from 'three/tsl';
+import {
+  AT_PROBE, COEFFICIENTS, COSINE_0, COSINE_1, COSINE_2, COSINE_2_ZONAL, CRUSH_BELOW, DILATED_FLOOR, LIFT, SHARES, SIDE_FLOOR,
+  TINY, UNSEEN_FLOOR, WORD,
+} from './lookup.js';
 
-const COEFFICIENTS = 9;
-const VOLUME_VECTORS = 11;
+const VOLUME_VECTORS = 12;
 
 // Light from the probes on everything in the scene. Light that comes from `scene.environment` is added to it: leave that out, or
 // lower `scene.environmentIntensity`, where the probes hold the sky.
@@ -46,7 +49,8 @@ export class RTGIProbeLight extends Light {
 // A volume as vectors. A float holds no more than 24 bits of a whole number, so the first texel is split.
 function volumeVectors(volume) {
   const values = [...volume.latticeFromOffset, ...volume.offsetFromLattice, ...volume.centre, volume.normalBias,
-    ...volume.resolution, volume.firstProbe, volume.tile, volume.firstTexel >> 12, volume.firstTexel & 4095, volume.distanceStep];
+    ...volume.resolution, volume.firstProbe, volume.tile, volume.firstTexel >> 12, volume.firstTexel & 4095, volume.distanceStep,
+    volume.firstNode, volume.probes === undefined ? 0 : 1, 0, 0];
   return Array.from({ length: VOLUME_VECTORS }, (_, i) => new Vector4().fromArray(values, 4 * i));
 }
 
@@ -54,10 +58,11 @@ function volumeVectors(volume) {
 function readVolume({ volumes }, index) {
   const vector = (i) => volumes.element(index.mul(VOLUME_VECTORS).add(i));
   const matrix = (i) => mat4(vector(i), vector(i + 1), vector(i + 2), vector(i + 3)).toVar();
-  const [centre, resolution, tile] = [8, 9, 10].map((i) => vector(i).toVar());
+  const [centre, resolution, tile, nodes] = [8, 9, 10, 11].map((i) => vector(i).toVar());
   return { latticeFromOffset: matrix(0), offsetFromLattice: matrix(4), centre: centre.xyz, normalBias: centre.w,
     resolution: ivec3(resolution.xyz).toVar(), firstProbe: int(resolution.w), tile: int(tile.x),
-    firstTexel: int(tile.y).mul(4096).add(int(tile.z)), distanceStep: tile.w };
+    firstTexel: int(tile.y).mul(4096).add(int(tile.z)), distanceStep: tile.w,
+    firstNode: int(nodes.x), scattered: nodes.y };
 }
 
 const latticeOf = (volume, offset) => volume.latticeFromOffset.mul(vec4(offset, 1)).xyz.toVar();
@@ -70,10 +75,10 @@ function octahedral(direction) {
   return select(d.z.lessThan(0), folded, xy);
 }
 
-// How surely the probe sees the point at `offset` from it: one-sided Chebyshev, cubed.
+// How surely the probe sees the point at `offset` from it.
 function visibility(read, volume, probe, offset) {
   const distance = length(offset).toVar();
-  const direction = select(distance.lessThanEqual(volume.normalBias.mul(1e-6)), vec3(0, 1, 0), offset);
+  const direction = select(distance.lessThanEqual(volume.normalBias.mul(AT_PROBE)), vec3(0, 1, 0), offset);
   const position = octahedral(direction).add(1).mul(float(volume.tile).mul(0.5)).add(0.5).toVar();
   const low = ivec2(position).clamp(ivec2(0), ivec2(volume.tile)).toVar();
   const f = position.sub(vec2(low)).toVar();
@@ -84,17 +89,43 @@ function visibility(read, volume, probe, offset) {
     return vec4(pair.x, pair.x.mul(pair.x).add(pair.y.mul(pair.y)), pair.z, pair.z.mul(pair.z).add(pair.w.mul(pair.w)));
   };
   const rows = mix(moments(texel), moments(texel.add(row)), f.y).toVar();
-  const blended = mix(rows.xy, rows.zw, f.x).toVar();
-  const behind = max(distance.sub(blended.x), 0).toVar();
-  const variance = blended.y.sub(blended.x.mul(blended.x)).abs().toVar();
-  const bound = variance.div(max(variance.add(behind.mul(behind)), 1.1754944e-38)).toVar();
-  return select(behind.greaterThan(0), bound.mul(bound).mul(bound), 1);
+  return seenShare(distance, mix(rows.xy, rows.zw, f.x).toVar());
 }
 
-// Irradiance from one volume, whose probes' coordinates at the point are `lattice`.
-function volumeIrradiance(read, volume, position, lattice, normal, surfaceNormal, basis) {
-  const offset = position.sub(volume.centre).toVar();
+function seenShare(distance, moments) {
+  const behind = distance.sub(moments.x).toVar();
+  const variance = moments.y.sub(moments.x.mul(moments.x)).abs().toVar();
+  const share = float(0.5).sub(behind.mul(0.5).div(sqrt(max(variance.add(behind.mul(behind)), TINY)))).toVar();
+  return share.mul(share);
+}
+
+function sideWeight(towards, surfaceNormal) {
+  const distance = length(towards).toVar();
+  const cosine = select(distance.greaterThan(0), towards.dot(surfaceNormal).div(max(distance, TINY)), 1);
+  const wrapped = cosine.add(1).mul(0.5).toVar();
+  return wrapped.mul(wrapped).add(SIDE_FLOOR);
+}
+
+function probeWeight(trilinear, seen, live) {
+  const crushed = select(seen.lessThan(CRUSH_BELOW), seen.mul(seen).mul(seen).div(CRUSH_BELOW ** 2), seen);
+  return trilinear.mul(select(live, crushed.add(UNSEEN_FLOOR), 0).add(DILATED_FLOOR));
+}
+
+// Adds a probe, whose place counts from `origin`, with its share in the light at `offset`; `meant`: it does not stand in for others.
+function addProbe(read, volume, index, origin, share, meant, offset, surfaceNormal, basis, sum, total) {
   const biased = offset.add(surfaceNormal.mul(volume.normalBias)).toVar();
+  const c = read.probe(index.add(volume.firstProbe));
+  const place = origin.add(vec3(c[0].w, c[1].w, c[2].w)).toVar();
+  const seen = sideWeight(place.sub(offset).toVar(), surfaceNormal).mul(visibility(read, volume, index, biased.sub(place))).toVar();
+  const weight = probeWeight(share, seen, c[3].w.notEqual(0).and(meant)).toVar();
+  total.addAssign(weight);
+  sum.addAssign(c.map(({ rgb }, k) => rgb.mul(basis[k])).reduce((a, b) => a.add(b)).mul(weight));
+}
+
+// Irradiance from one volume.
+function volumeIrradiance(read, volume, position, surfaceNormal, basis) {
+  const offset = position.sub(volume.centre).toVar();
+  const lattice = latticeOf(volume, offset.add(surfaceNormal.mul(volume.normalBias.mul(LIFT))));
   const last = volume.resolution.sub(1).toVar();
   const clamped = lattice.clamp(vec3(0), vec3(last)).toVar();
   const low = min(ivec3(clamped), max(last.sub(1), ivec3(0))).toVar();
@@ -108,17 +139,23 @@ function volumeIrradiance(read, volume, position, lattice, normal, surfaceNormal
     const trilinear = along.x.mul(along.y).mul(along.z).toVar();
     If(trilinear.greaterThan(0), () => {
       const index = cell.z.mul(volume.resolution.y).add(cell.y).mul(volume.resolution.x).add(cell.x).toVar();
-      const c = read.probe(index.add(volume.firstProbe));
-      const place = volume.offsetFromLattice.mul(vec4(vec3(cell), 1)).xyz.add(vec3(c[0].w, c[1].w, c[2].w)).toVar();
-      const towards = place.sub(offset).toVar();
-      const distance = length(towards).toVar();
-      const cosine = select(distance.greaterThan(0), towards.dot(normal).div(max(distance, 1.1754944e-38)), 1);
-      const wrapped = cosine.add(1).mul(0.5).toVar();
-      const seen = wrapped.mul(wrapped).add(0.2).mul(visibility(read, volume, index, biased.sub(place))).toVar();
-      seen.assign(select(seen.lessThan(0.2), seen.mul(seen).mul(seen).div(0.04), seen));
-      const weight = trilinear.mul(select(c[3].w.notEqual(0), seen.add(1e-4), 0).add(1e-12)).toVar();
-      total.addAssign(weight);
-      sum.addAssign(c.map(({ rgb }, k) => rgb.mul(basis[k])).reduce((a, b) => a.add(b)).mul(weight));
+      const add = (probe, origin, share, meant) => addProbe(read, volume, probe, origin, share, meant, offset, surfaceNormal, basis,
+        sum, total);
+      if (!read.words) {
+        add(index, volume.offsetFromLattice.mul(vec4(vec3(cell), 1)).xyz, trilinear, bool(true));
+        return;
+      }
+      const scattered = volume.scattered.notEqual(0).toVar();
+      const words = read.words(index.add(volume.firstNode)).toVar();
+      const origin = select(scattered, vec3(0), volume.offsetFromLattice.mul(vec4(vec3(cell), 1)).xyz).toVar();
+      Loop(select(scattered, int(4), int(1)), ({ i: slot }) => {
+        const word = select(scattered, words.element(slot), float(SHARES)).toVar();
+        const named = int(word.abs()).toVar();
+        If(word.notEqual(0), () => {
+          add(select(scattered, named.div(WORD), index).toVar(), origin, trilinear.mul(float(named.mod(WORD)).div(SHARES)).toVar(),
+            word.greaterThan(0));
+        });
+      });
     });
   });
   return max(sum.div(total), 0);
@@ -127,9 +164,9 @@ function volumeIrradiance(read, volume, position, lattice, normal, surfaceNormal
 // Irradiance at a point of the probes' space on a surface whose geometry faces surfaceNormal and whose shading faces normal.
 function irradiance(read, count, position, normal, surfaceNormal) {
   const { x, y, z } = normal;
-  const basis = [float(0.88622693), y.mul(1.02332671), z.mul(1.02332671), x.mul(1.02332671), x.mul(y).mul(0.85808553),
-    y.mul(z).mul(0.85808553), z.mul(z).mul(0.74312386).sub(0.24770796), x.mul(z).mul(0.85808553),
-    x.add(y).mul(x.sub(y)).mul(0.42904277)].map((value) => value.toVar());
+  const basis = [float(COSINE_0), y.mul(COSINE_1), z.mul(COSINE_1), x.mul(COSINE_1), x.mul(y).mul(COSINE_2), y.mul(z).mul(COSINE_2),
+    z.mul(z).mul(3).sub(1).mul(COSINE_2_ZONAL), x.mul(z).mul(COSINE_2), x.add(y).mul(x.sub(y)).mul(0.5 * COSINE_2)]
+    .map((value) => value.toVar());
   const shares = array('float', count).toVar();
   const total = float(0).toVar(), left = float(1).toVar(), nearest = int(0).toVar(), nearestDistance = float(3.402823e38).toVar();
   Loop(count, ({ i }) => {
@@ -156,8 +193,7 @@ function irradiance(read, count, position, normal, surfaceNormal) {
   Loop(count, ({ i }) => {
     If(shares.element(i).greaterThan(0), () => {
       const volume = readVolume(read, int(i));
-      const lattice = latticeOf(volume, position.sub(volume.centre));
-      sum.addAssign(volumeIrradiance(read, volume, position, lattice, normal, surfaceNormal, basis).mul(shares.element(i)));
+      sum.addAssign(volumeIrradiance(read, volume, position, surfaceNormal, basis).mul(shares.element(i)));
     });
   });
   return sum.div(total);
@@ -165,10 +201,14 @@ function irradiance(read, count, position, normal, surfaceNormal) {
 
 // How the shader reads the arrays of `light`.
 function reader({ probes, distances }) {
-  const { value } = probes.uniforms.rtgiProbes;
+  const { value } = probes.uniforms.rtgiProbes, wordsNode = probes.uniforms.rtgiWords && texture(probes.uniforms.rtgiWords.value);
   const [probesNode, distancesNode] = [texture(value), texture(distances)];
   const perRow = int(value.image.width / COEFFICIENTS), width = int(distances.image.width);
   return {
+    words: wordsNode && ((index) => {
+      const across = int(probes.uniforms.rtgiWords.value.image.width);
+      return wordsNode.load(ivec2(index.mod(across), index.div(across)));
+    }),
     volumes: uniformArray(probes.volumes.flatMap(volumeVectors)),
     distances: (index) => distancesNode.load(ivec2(index.mod(width), index.div(width))),
     probe: (index) => {
@@ -200,7 +240,7 @@ class RTGIProbeLightNode extends AnalyticLightNode {
     const direction = (normal) => normalize(this._fromWorld.mul(vec4(normal, 0)).xyz).toVar();
     const light = Fn(() => {
       // The geometry's normal does not turn with the side that is seen; the shading's does.
-      const side = select(normalWorldGeometry.dot(normalWorld).lessThan(0), -1, 1);
+      const side = select(frontFacing, 1, -1);
       const position = this._fromWorld.mul(vec4(positionWorld, 1)).xyz.toVar();
       return irradiance(read, probes.volumes.length, position, direction(normalWorld), direction(normalWorldGeometry.mul(side)));
     })().mul(this._intensity).toVar();

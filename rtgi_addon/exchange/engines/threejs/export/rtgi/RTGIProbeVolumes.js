@@ -1,15 +1,16 @@
 // Irradiance probe volumes baked by RTGI, for three.js (WebGLRenderer, r160 or later; no bundler needed).
 //
-//   const probes = await new RTGIProbeLoader().loadAsync('probes.json');
+//   const probes = await new RTGIProbeLoader().loadAsync('rtgi/probes.json');
 //   scene.add(probes);
 //   probes.apply(model);                 // every lit material in it
 //
 // Units are those of the bake: radiance [W/(sr m2)], irradiance [W/m2], scene-linear Rec. 709, Y up, metres.
 
 import {
-  Color, DataTexture, DataUtils, FileLoader, HalfFloatType, LightProbe, Loader, LoaderUtils, Matrix3, Matrix4, NearestFilter,
+  Color, DataTexture, DataUtils, FileLoader, FloatType, HalfFloatType, LightProbe, Loader, LoaderUtils, Matrix3, Matrix4, NearestFilter,
   Object3D, RGBAFormat, RGBAIntegerFormat, REVISION, UnsignedShortType, Vector3,
 } from 'three';
+import { Hooks } from './hook.js';
 import { COEFFICIENTS, ProbeLookup, harmonics } from './lookup.js';
 import { spliceProbes } from './shader.js';
 
@@ -73,8 +74,7 @@ function check(description) {
 }
 
 // Which material is lit by which probes, and what its own hooks were.
-const hooked = new WeakMap();
-const HOOKS = ['onBeforeCompile', 'customProgramCacheKey'];
+const hooks = new Hooks();
 
 // The volumes of one bake. As an Object3D it may be moved, turned and scaled (alike along all axes) with the model it lights.
 export class RTGIProbeVolumes extends Object3D {
@@ -85,17 +85,19 @@ export class RTGIProbeVolumes extends Object3D {
     this.isRTGIProbeVolumes = true;
     this.type = 'RTGIProbeVolumes';
     this.name = description.scene;
-    // Whether the light of lamps is in the probes; if not, the scene's own lights add it.
+    // Whether the direct light of any lamp is in the probes; the scene's own lights add that of the others.
     this.includesDirect = description.includesDirect;
+    // By Blender's names: what is baked of each lamp ('all', 'bounces' or 'none'), and which objects are 'dynamic'.
+    this.lamps = description.lamps ?? {};
+    this.objects = description.objects ?? {};
     this.volumes = prepare(description.volumes);
     if (this.volumes.length > MOST_VOLUMES) {
       throw new Error(`RTGI: ${this.volumes.length} volumes are more than the ${MOST_VOLUMES} that a shader has room for: ` +
         'bake fewer');
     }
-    const { probes, distances } = unpack(this.volumes, buffer);
-    this.lookup = new ProbeLookup(this.volumes, probes.numbers, distances);
-    this.uniforms = makeUniforms(this.volumes, probes.halves, distances);
-    this._materials = new Set();
+    const { probes, distances, words } = unpack(this.volumes, buffer);
+    this.lookup = new ProbeLookup(this.volumes, probes.numbers, distances, words);
+    this.uniforms = makeUniforms(this.volumes, probes.halves, distances, words);
   }
 
   // A factor of the probes' light. 1 is the bake's own, in W/m2 where lamps are in W/sr.
@@ -105,6 +107,24 @@ export class RTGIProbeVolumes extends Object3D {
 
   set intensity(value) {
     this.uniforms.rtgiIntensity.value = value;
+  }
+
+  // Whether the probes hold the direct light of `light`, which glTF's loader made, so that it must not shine as well.
+  holdsDirect(light) {
+    const known = Object.keys(this.lamps).length > 0;
+    return known ? this.lamps[light.userData.name ?? light.name] === 'all' : this.includesDirect;
+  }
+
+  // Have materials mirror `mirrors` (RTGISpheres.js) from the next `apply` on, and return this.
+  addMirrors(mirrors) {
+    this.mirrors = mirrors;
+    return this;
+  }
+
+  // Have the objects of `atlas` (RTGIAtlas.js) read it in place of the probes from the next `apply` on, and return this.
+  addAtlas(atlas) {
+    this.atlas = atlas;
+    return this;
   }
 
   // Light `target`, a material or every lit material below an Object3D, and return this. Objects of a shared material share the
@@ -118,6 +138,9 @@ export class RTGIProbeVolumes extends Object3D {
       this._hook(target);
     } else {
       target.traverse((object) => {
+        if (object.isMesh) {
+          this.atlas?.prepare(object);
+        }
         for (const material of [object.material ?? []].flat().filter(isLit)) {
           this._hook(material);
         }
@@ -129,23 +152,24 @@ export class RTGIProbeVolumes extends Object3D {
   // Take the light of these probes from `target` again, a material or everything below an Object3D, and return this.
   release(target) {
     if (target.isMaterial) {
-      this._unhook(target);
+      hooks.remove(this, target);
     } else {
-      target.traverse((object) => [object.material ?? []].flat().forEach((material) => this._unhook(material)));
+      target.traverse((object) => [object.material ?? []].flat().forEach((material) => hooks.remove(this, material)));
     }
     return this;
   }
 
-  // Irradiance [W/m2] at a point of the world with a unit normal there, into a Color.
-  irradiance(position, normal, target = new Color()) {
-    const [point, direction] = this._local(position, normal);
-    const [r, g, b] = this.lookup.irradiance(point, direction);
+  // Irradiance [W/m2] at a point of the world with a unit normal there, into a Color. Where that is the normal of a normal map,
+  // `surfaceNormal` is the surface's own.
+  irradiance(position, normal, target = new Color(), surfaceNormal = normal) {
+    const [point, direction, surfaceDirection] = this._local(position, normal, surfaceNormal);
+    const [r, g, b] = this.lookup.irradiance(point, direction, surfaceDirection);
     return target.setRGB(r * this.intensity, g * this.intensity, b * this.intensity);
   }
 
   // The radiance that arrives at a point of the world, into a SphericalHarmonics3 as LightProbe wants it.
   radiance(position, target) {
-    const [point] = this._local(position, null);
+    const [point] = this._local(position);
     const coefficients = turned(this.lookup.radiance(point), this._rotation());
     target.coefficients.forEach((c, i) => c.fromArray(coefficients, 3 * i).multiplyScalar(this.intensity));
     return target;
@@ -182,18 +206,20 @@ export class RTGIProbeVolumes extends Object3D {
 
   // Free the textures, and give materials back as they were.
   dispose() {
-    [...this._materials].forEach((material) => this._unhook(material));
+    hooks.clear(this);
     this.uniforms.rtgiProbes.value.dispose();
     this.uniforms.rtgiDistances.value.dispose();
+    this.uniforms.rtgiWords?.value.dispose();
   }
 
   _updateUniforms() {
     this.uniforms.rtgiFromWorld.value.copy(this.matrixWorld).invert();
   }
 
-  _local(position, normal) {
-    const point = position.clone().applyMatrix4(this.uniforms.rtgiFromWorld.value).toArray();
-    return [point, normal && normal.clone().transformDirection(this.uniforms.rtgiFromWorld.value).toArray()];
+  _local(position, ...normals) {
+    const fromWorld = this.uniforms.rtgiFromWorld.value;
+    return [position.clone().applyMatrix4(fromWorld), ...normals.map((normal) => normal.clone().transformDirection(fromWorld))]
+      .map((vector) => vector.toArray());
   }
 
   _rotation() {
@@ -201,40 +227,17 @@ export class RTGIProbeVolumes extends Object3D {
   }
 
   _hook(material) {
-    const earlier = hooked.get(material);
-    if (earlier?.probes === this) {
-      return;
-    }
-    earlier?.probes._unhook(material);
-    const { onBeforeCompile, customProgramCacheKey } = material;
-    // Own hooks of the material come back when it is released; else those of its class do.
-    const own = HOOKS.filter((name) => Object.hasOwn(material, name)).map((name) => [name, material[name]]);
-    // Materials of equal settings share a program, so the key must tell what their hooks do to it; three's own key is the text of
-    // onBeforeCompile, which here would be ours.
-    const key = Object.hasOwn(material, 'customProgramCacheKey')
-      ? () => customProgramCacheKey.call(material) : () => onBeforeCompile.toString();
-    hooked.set(material, { probes: this, own });
-    this._materials.add(material);
-    material.onBeforeCompile = (shader, renderer) => {
-      onBeforeCompile.call(material, shader, renderer);
+    const { atlas } = this, part = atlas && material.userData.rtgiAtlas;
+    const volumes = `${this.volumes.length}${this.uniforms.rtgiWords ? ' scattered' : ''}`;
+    hooks.add(this, material, (shader, renderer) => {
       this._checkTextures(renderer);
       Object.assign(shader.uniforms, this.uniforms);
-      spliceProbes(shader, this.volumes.length, material.name || material.type);
-    };
-    material.customProgramCacheKey = () => `rtgi ${this.volumes.length} ${key()}`;
-    material.needsUpdate = true;
-  }
-
-  _unhook(material) {
-    const hook = hooked.get(material);
-    if (hook?.probes !== this) {
-      return;
-    }
-    HOOKS.forEach((name) => delete material[name]);
-    Object.assign(material, Object.fromEntries(hook.own));
-    hooked.delete(material);
-    this._materials.delete(material);
-    material.needsUpdate = true;
+      spliceProbes(shader, this.volumes, material.name || material.type);
+      this.mirrors?.splice(shader);
+      if (part) {
+        atlas.splice(shader, part);
+      }
+    }, () => `rtgi ${volumes} ${this.mirrors?.count ?? 0} ${part ? 'atlas' : ''}`);
   }
 
   _checkTextures(renderer) {
@@ -271,18 +274,21 @@ const isLit = (material) => LIT.some((name) => material[name]) && !material.isNo
 
 // The volumes of a .json with what the look-up needs of each.
 function prepare(volumes) {
-  let firstProbe = 0, firstTexel = 0;
+  let firstProbe = 0, firstTexel = 0, firstNode = 0;
   return volumes.map((volume) => {
-    const count = volume.resolution[0] * volume.resolution[1] * volume.resolution[2];
+    const nodes = volume.resolution[0] * volume.resolution[1] * volume.resolution[2];
+    const count = volume.probes ?? nodes;
     const offsetFromLattice = new Matrix4().fromArray(volume.latticeFromOffset).invert().toArray();
-    const prepared = { ...volume, count, firstProbe, firstTexel, offsetFromLattice };
+    const prepared = { ...volume, count, firstProbe, firstTexel, firstNode, offsetFromLattice };
+    firstNode += volume.probes === undefined ? 0 : nodes;
     firstProbe += count;
     firstTexel += count * (volume.tile + 1) * (volume.tile + 2);
     return prepared;
   });
 }
 
-// The arrays of a .bin: halves of all probes, then distances of all tiles (mean, deviation), both in steps of two bytes.
+// The arrays of a .bin: halves of all probes, then distances of all tiles (mean, deviation), both in steps of two bytes, then words
+// of the nodes of scattered volumes.
 function unpack(volumes, buffer) {
   const total = volumes.reduce((sum, volume) => sum + volume.count, 0);
   const halves = new Uint16Array(buffer, 0, 4 * COEFFICIENTS * total);
@@ -304,7 +310,8 @@ function unpack(volumes, buffer) {
       }
     }
   }
-  return { probes: { halves, numbers }, distances };
+  const words = new Float32Array(buffer, halves.byteLength + 2 * from);
+  return { probes: { halves, numbers }, distances, words };
 }
 
 // Where the octahedral map goes on past the edges of its square: mirrored along an edge, in the opposite corner beyond a corner.
@@ -316,9 +323,14 @@ function wrapped(row, column, tile) {
   return (outsideColumn ? last - row : row) * tile + (outsideRow ? last - column : column);
 }
 
-function makeUniforms(volumes, halves, distances) {
+function makeUniforms(volumes, halves, distances, words) {
   const flat = (values, type = Float32Array) => ({ value: type.from(volumes.flatMap(values)) });
+  const scattered = words.length === 0 ? {} : {
+    rtgiWords: { value: listTexture(words, 1, RGBAFormat, FloatType) },
+    rtgiNodes: flat((volume) => [volume.firstNode, volume.probes === undefined ? 0 : 1], Int32Array),
+  };
   return {
+    ...scattered,
     rtgiProbes: { value: listTexture(halves, COEFFICIENTS, RGBAFormat, HalfFloatType) },
     rtgiDistances: { value: listTexture(distances, 1, RGBAIntegerFormat, UnsignedShortType, 'RGBA16UI') },
     rtgiFromWorld: { value: new Matrix4() },
@@ -337,7 +349,7 @@ function listTexture(values, texels, format, type, internalFormat = null) {
   const items = values.length / (4 * texels);
   const perRow = Math.max(Math.min(Math.ceil(Math.sqrt(items / texels)), items), 1);
   const width = perRow * texels, height = Math.ceil(items / perRow);
-  const padded = new Uint16Array(4 * width * height);
+  const padded = new values.constructor(4 * width * height);
   padded.set(values);
   const texture = new DataTexture(padded, width, height, format, type);
   // Old releases do not find the one of integers by themselves.

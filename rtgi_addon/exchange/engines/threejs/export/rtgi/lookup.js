@@ -1,13 +1,29 @@
 // What the probes say about a point on a surface, on the CPU: the twin of shader.js, in plain numbers and without three.
 //
+// A surface has two normals: the one that is shaded, with bumps and normal maps, belongs to the cosine of irradiance; its own, n
+// below, says which probes are behind it and where it must be seen from.
+//
 // Eight neighbours, weighted by what they can know of the point: trilinear x ((n.d + 1) / 2)^2 + 0.2 (d towards the probe: probes
-// behind the surface count little) x the Chebyshev bound (v / (v + (r - m)^2))^3 that the probe sees the point at distance r, from
-// the mean m and variance v of the distances stored in that direction; weights below 0.2 are crushed to w^3 / 0.2^2. Probes inside
-// geometry weigh nothing. See Z. Majercik et al., "Dynamic Diffuse Global Illumination with Ray-Traced Irradiance Fields", JCGT
-// 8(2), 2019.
+// behind the surface count little) x the square of the share of what the probe saw in that direction that lies beyond the point, from
+// mean and variance of the distances stored; weights below 0.2 are crushed to w^3 / 0.2^2. Probes inside geometry weigh nothing.
+// After Z. Majercik et al., "Dynamic Diffuse Global Illumination with Ray-Traced Irradiance Fields", JCGT 8(2), 2019.
 
-const TINY = 1.1754944e-38;
 export const COEFFICIENTS = 9;
+
+// The numbers of weights.js, for this file and RTGIProbeLight.js.
+export const SIDE_FLOOR = 0.2;
+export const CRUSH_BELOW = 0.2;
+export const UNSEEN_FLOOR = 1e-4;
+export const DILATED_FLOOR = 1e-12;
+export const LIFT = 0.2;
+export const AT_PROBE = 1e-6;
+export const TINY = 1.17549435e-38;
+export const WORD = 256;
+export const SHARES = 255;
+export const COSINE_0 = 0.886226925;
+export const COSINE_1 = 1.02332671;
+export const COSINE_2 = 0.858085531;
+export const COSINE_2_ZONAL = 0.247707956;
 
 // The real orthonormal harmonics 1, y, z, x, xy, yz, 3z^2 - 1, xz, x^2 - y^2 at the unit direction (x, y, z).
 export function harmonics(x, y, z, target = new Array(COEFFICIENTS)) {
@@ -23,8 +39,29 @@ export function harmonics(x, y, z, target = new Array(COEFFICIENTS)) {
   return target;
 }
 
-// What the cosine lobe leaves of each coefficient of radiance (Ramamoorthi and Hanrahan 2001).
-export const COSINE_LOBE = [Math.PI, ...Array(3).fill(2 * Math.PI / 3), ...Array(5).fill(Math.PI / 4)];
+// The same, each times its band of the cosine lobe (Ramamoorthi and Hanrahan 2001): irradiance from radiance.
+function cosineBasis(x, y, z) {
+  return [COSINE_0, COSINE_1 * y, COSINE_1 * z, COSINE_1 * x, COSINE_2 * x * y, COSINE_2 * y * z, COSINE_2_ZONAL * (3 * z * z - 1),
+    COSINE_2 * x * z, 0.5 * COSINE_2 * (x + y) * (x - y)];
+}
+
+// How surely a probe sees a point at that distance, where its tile has that mean and mean square: the share beyond it, squared.
+function seenShare(distance, mean, square) {
+  const behind = distance - mean;
+  const variance = Math.abs(square - mean * mean);
+  return (0.5 - 0.5 * behind / Math.sqrt(Math.max(variance + behind * behind, TINY))) ** 2;
+}
+
+function sideWeight(towards, normal) {
+  const distance = Math.hypot(...towards);
+  const cosine = distance > 0 ? (towards[0] * normal[0] + towards[1] * normal[1] + towards[2] * normal[2]) / distance : 1;
+  return (0.5 * (cosine + 1)) ** 2 + SIDE_FLOOR;
+}
+
+function probeWeight(trilinear, seen, live) {
+  const crushed = seen < CRUSH_BELOW ? seen ** 3 / CRUSH_BELOW ** 2 : seen;
+  return trilinear * ((live ? crushed + UNSEEN_FLOOR : 0) + DILATED_FLOOR);
+}
 
 // m (4x4, column by column) times the point or, with w = 0, the vector (x, y, z).
 function transform(m, x, y, z, w = 1) {
@@ -45,24 +82,27 @@ function octahedral(x, y, z) {
 }
 
 // Probes ready for reading: `volumes` as RTGIProbeLoader prepares them, finest cells first; `probes` (Float32Array) nine texels of
-// four a probe; `distances` (Uint16Array) the bordered tiles of (mean, deviation) of a texel and of the next one in its row.
+// four a probe; `distances` (Uint16Array) the bordered tiles of (mean, deviation) of a texel and of the next one in its row; `words`
+// (Float32Array) what the nodes of scattered volumes name, four each.
 export class ProbeLookup {
-  constructor(volumes, probes, distances) {
+  constructor(volumes, probes, distances, words = []) {
+    this.words = words;
     this.volumes = volumes;
     this.probes = probes;
     this.distances = distances;
   }
 
-  // Irradiance [W/m2] at `point` with unit `normal` ([x, y, z] each, the probes' space), never negative, into `target` (r, g, b).
-  irradiance(point, normal, target = [0, 0, 0]) {
-    const weights = harmonics(...normal);
+  // Irradiance [W/m2] at `point` with unit `normal` on a surface with unit `surfaceNormal` ([x, y, z] each, the probes' space), never
+  // negative, into `target` (r, g, b).
+  irradiance(point, normal, surfaceNormal = normal, target = [0, 0, 0]) {
+    const basis = cosineBasis(...normal);
     target.fill(0);
     for (const [volume, share] of this.shares(point)) {
-      const coefficients = this._blended(volume, point, normal);
+      const coefficients = this._blended(volume, point, surfaceNormal);
       for (let channel = 0; channel < 3; channel++) {
         let sum = 0;
         for (let i = 0; i < COEFFICIENTS; i++) {
-          sum += COSINE_LOBE[i] * weights[i] * coefficients[3 * i + channel];
+          sum += basis[i] * coefficients[3 * i + channel];
         }
         target[channel] += share * Math.max(sum, 0);
       }
@@ -111,17 +151,21 @@ export class ProbeLookup {
   // The probe at `index` of the flat lattice of `volume`: its place from the volume's centre, and whether it holds light.
   probe(volume, index) {
     const [nx, ny] = volume.resolution;
-    const place = transform(volume.offsetFromLattice, index % nx, Math.floor(index / nx) % ny, Math.floor(index / (nx * ny)));
+    // Places of scattered probes count from the centre.
+    const place = volume.probes === undefined
+      ? transform(volume.offsetFromLattice, index % nx, Math.floor(index / nx) % ny, Math.floor(index / (nx * ny))) : [0, 0, 0];
     const first = 4 * COEFFICIENTS * (volume.firstProbe + index);
     return { place: place.map((value, axis) => value + this.probes[first + 4 * axis + 3]), live: this.probes[first + 15] !== 0 };
   }
 
-  // The coefficients (27) that the eight probes around `point` agree on. Without a normal only what they see weighs them.
+  // The coefficients (27) that the eight probes around `point` agree on, with the surface's own normal there. Without a normal only
+  // what they see weighs them.
   _blended(volume, point, normal) {
     const offset = point.map((value, axis) => value - volume.centre[axis]);
     const biased = normal ? offset.map((value, axis) => value + volume.normalBias * normal[axis]) : offset;
     const low = [], fraction = [];
-    transform(volume.latticeFromOffset, ...offset).forEach((value, axis) => {
+    const lifted = normal ? offset.map((value, axis) => value + LIFT * volume.normalBias * normal[axis]) : offset;
+    transform(volume.latticeFromOffset, ...lifted).forEach((value, axis) => {
       const last = volume.resolution[axis] - 1, position = clamp(value, 0, last);
       low[axis] = Math.min(Math.floor(position), Math.max(last - 1, 0));
       fraction[axis] = position - low[axis];
@@ -138,32 +182,39 @@ export class ProbeLookup {
       if (trilinear === 0) {
         continue;
       }
-      const { place, live } = this.probe(volume, index);
-      let seen = this._visibility(volume, index, biased.map((value, axis) => value - place[axis]));
-      if (normal) {
-        const towards = place.map((value, axis) => value - offset[axis]);
-        const distance = Math.hypot(...towards);
-        const cosine = distance > 0
-          ? (towards[0] * normal[0] + towards[1] * normal[1] + towards[2] * normal[2]) / distance : 1;
-        seen *= (0.5 * (cosine + 1)) ** 2 + 0.2;
-      }
-      seen = seen < 0.2 ? seen ** 3 / 0.04 : seen;
-      const weight = trilinear * ((live ? seen + 1e-4 : 0) + 1e-12);
-      total += weight;
-      const first = 4 * COEFFICIENTS * (volume.firstProbe + index);
-      for (let i = 0; i < COEFFICIENTS; i++) {
-        for (let channel = 0; channel < 3; channel++) {
-          sum[3 * i + channel] += weight * this.probes[first + 4 * i + channel];
+      for (const [probe, share, meant] of this._named(volume, index)) {
+        const { place, live } = this.probe(volume, probe);
+        let seen = this._visibility(volume, probe, biased.map((value, axis) => value - place[axis]));
+        if (normal) {
+          seen *= sideWeight(place.map((value, axis) => value - offset[axis]), normal);
+        }
+        const weight = probeWeight(trilinear * share, seen, meant && live);
+        total += weight;
+        const first = 4 * COEFFICIENTS * (volume.firstProbe + probe);
+        for (let i = 0; i < COEFFICIENTS; i++) {
+          for (let channel = 0; channel < 3; channel++) {
+            sum[3 * i + channel] += weight * this.probes[first + 4 * i + channel];
+          }
         }
       }
     }
     return sum.map((value) => value / total);
   }
 
-  // How surely the probe sees the point at `offset` from it: one-sided Chebyshev, cubed.
+  // What a node names: of each probe its index, its share, and whether it is meant and does not stand in for others.
+  _named(volume, node) {
+    if (volume.probes === undefined) {
+      return [[node, 1, true]];
+    }
+    const first = 4 * (volume.firstNode + node);
+    return Array.from(this.words.slice(first, first + 4)).filter((word) => word !== 0)
+      .map((word) => [Math.floor(Math.abs(word) / WORD), Math.abs(word) % WORD / SHARES, word > 0]);
+  }
+
+  // How surely the probe sees the point at `offset` from it.
   _visibility(volume, index, offset) {
     const distance = Math.hypot(...offset), tile = volume.tile;
-    const [u, v] = distance <= 1e-6 * volume.normalBias ? [0, 0] : octahedral(...offset);
+    const [u, v] = distance <= AT_PROBE * volume.normalBias ? [0, 0] : octahedral(...offset);
     const x = (u + 1) * 0.5 * tile + 0.5, y = (v + 1) * 0.5 * tile + 0.5;
     const column = clamp(Math.floor(x), 0, tile), row = clamp(Math.floor(y), 0, tile);
     const fx = x - column, fy = y - row;
@@ -176,11 +227,6 @@ export class ProbeLookup {
         square += share * along * (m * m + s * s);
       }
     }
-    const behind = distance - mean;
-    if (behind <= 0) {
-      return 1;
-    }
-    const variance = Math.abs(square - mean * mean);
-    return (variance / Math.max(variance + behind * behind, TINY)) ** 3;
+    return seenShare(distance, mean, square);
   }
 }

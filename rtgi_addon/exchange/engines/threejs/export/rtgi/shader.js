@@ -1,4 +1,10 @@
-// The look-up on the GPU, as it is spliced into three's own materials. lookup.js is the same on the CPU and says what it does.
+// The look-up on the GPU, as it is spliced into three's own materials. lookup.js is the same on the CPU and says what it does;
+// weights.js has its functions of places and distances alone, which all of RTGI's shaders share.
+
+import { weights } from './weights.js';
+
+// Where others may add to the look-up's functions, and to its light.
+export const DECLARED = '// RTGI: declared\n', LIT = '// RTGI: lit\n';
 
 const vertexPars = /* glsl */ `
 uniform mat4 rtgiFromWorld;
@@ -30,20 +36,16 @@ uniform vec4 rtgiCentre[RTGI_VOLUMES];      // the volume's centre; how far the 
 uniform ivec4 rtgiResolution[RTGI_VOLUMES]; // probes along the axes; its first probe
 uniform ivec2 rtgiTile[RTGI_VOLUMES];       // texels along a tile without its border; its first texel
 uniform float rtgiDistanceStep[RTGI_VOLUMES];
+#ifdef RTGI_SCATTERED
+// What the nodes of scattered volumes name: four words each.
+uniform highp sampler2D rtgiWords;
+uniform ivec2 rtgiNodes[RTGI_VOLUMES];      // the volume's first node; whether it is scattered
+#endif
 varying vec3 vRTGIPosition;
 
-#define RTGI_TINY 1.1754944e-38
-
+${weights}
 ivec2 rtgiTexel(int index, int width) {
   return ivec2(index % width, index / width);
-}
-
-// The square that directions are unfolded to, from -1 to 1. Tiles keep Blender's axes.
-vec2 rtgiOctahedral(vec3 direction) {
-  vec3 d = vec3(direction.x, -direction.z, direction.y);
-  vec2 xy = d.xy / (abs(d.x) + abs(d.y) + abs(d.z));
-  vec2 folded = (1.0 - abs(xy.yx)) * mix(vec2(1.0), vec2(-1.0), lessThan(xy, vec2(0.0)));
-  return d.z < 0.0 ? folded : xy;
 }
 
 // Distance and its square in two neighbouring texels of a row, (mean, mean square) each.
@@ -53,35 +55,49 @@ vec4 rtgiMoments(int texel, float distanceStep) {
   return vec4(pair.x, squared.x, pair.z, squared.y);
 }
 
-// How surely the probe sees the point at offset from it: one-sided Chebyshev, cubed.
+// How surely the probe sees the point at offset from it. Tiles keep the bake's axes, with z up.
 float rtgiVisibility(int volume, int probe, vec3 offset) {
-  float distance = length(offset);
-  if (distance <= 1e-6 * rtgiCentre[volume].w) {
-    offset = vec3(0.0, 1.0, 0.0);
-  }
   int tile = rtgiTile[volume].x;
-  vec2 position = (rtgiOctahedral(offset) + 1.0) * (0.5 * float(tile)) + 0.5;
+  vec2 position = rtgi_tile_position(vec3(offset.x, -offset.z, offset.y), tile, rtgiCentre[volume].w);
   ivec2 low = clamp(ivec2(position), ivec2(0), ivec2(tile));
   vec2 f = position - vec2(low);
   int texel = rtgiTile[volume].y + (probe * (tile + 2) + low.y) * (tile + 1) + low.x;
-  vec4 lower = rtgiMoments(texel, rtgiDistanceStep[volume]);
-  vec4 upper = rtgiMoments(texel + tile + 1, rtgiDistanceStep[volume]);
-  vec4 row = mix(lower, upper, f.y);
-  vec2 moments = mix(row.xy, row.zw, f.x);
-  float behind = max(distance - moments.x, 0.0);
-  float variance = abs(moments.y - moments.x * moments.x);
-  float bound = variance / max(variance + behind * behind, RTGI_TINY);
-  return behind > 0.0 ? bound * bound * bound : 1.0;
+  vec4 row = mix(rtgiMoments(texel, rtgiDistanceStep[volume]), rtgiMoments(texel + tile + 1, rtgiDistanceStep[volume]), f.y);
+  return rtgi_seen_share(length(offset), mix(row.xy, row.zw, f.x));
 }
 
-// Irradiance from one volume at offset from its centre, where its probes' coordinates are lattice.
-vec3 rtgiVolumeIrradiance(int volume, vec3 offset, vec3 lattice, vec3 normal, vec3 surfaceNormal, float basis[9]) {
+// The probes' coordinates of a point at offset from the volume's centre.
+vec3 rtgiLattice(int volume, vec3 offset) {
+  return (rtgiLatticeFromOffset[volume] * vec4(offset, 1.0)).xyz;
+}
+
+// Adds a probe, whose place counts from origin, with its share in the light at offset; meant says that it does not stand in for others.
+void rtgiAdd(int volume, int index, vec3 origin, float share, bool meant, vec3 offset, vec3 surfaceNormal, float basis[9],
+    inout vec3 sum, inout float total) {
+  ivec2 texel = rtgiTexel(rtgiResolution[volume].w + index, textureSize(rtgiProbes, 0).x / 9) * ivec2(9, 1);
+  vec4 c0 = texelFetch(rtgiProbes, texel, 0);
+  vec4 c1 = texelFetch(rtgiProbes, texel + ivec2(1, 0), 0);
+  vec4 c2 = texelFetch(rtgiProbes, texel + ivec2(2, 0), 0);
+  vec4 c3 = texelFetch(rtgiProbes, texel + ivec2(3, 0), 0);
+  vec3 place = origin + vec3(c0.w, c1.w, c2.w);
+  vec3 biased = offset + rtgiCentre[volume].w * surfaceNormal;
+  float seen = rtgi_side_weight(place - offset, surfaceNormal) * rtgiVisibility(volume, index, biased - place);
+  float weight = rtgi_probe_weight(share, seen, meant && c3.w != 0.0);
+  total += weight;
+  vec3 irradiance = basis[0] * c0.rgb + basis[1] * c1.rgb + basis[2] * c2.rgb + basis[3] * c3.rgb;
+  for (int i = 4; i < 9; i++) {
+    irradiance += basis[i] * texelFetch(rtgiProbes, texel + ivec2(i, 0), 0).rgb;
+  }
+  sum += weight * irradiance;
+}
+
+// Irradiance from one volume at offset from its centre.
+vec3 rtgiVolumeIrradiance(int volume, vec3 offset, vec3 surfaceNormal, float basis[9]) {
+  vec3 lattice = rtgiLattice(volume, rtgi_lifted(offset, surfaceNormal, rtgiCentre[volume].w));
   ivec3 last = rtgiResolution[volume].xyz - 1;
   vec3 position = clamp(lattice, vec3(0.0), vec3(last));
   ivec3 low = min(ivec3(position), max(last - 1, ivec3(0)));
   vec3 f = position - vec3(low);
-  vec3 biased = offset + rtgiCentre[volume].w * surfaceNormal;
-  int perRow = textureSize(rtgiProbes, 0).x / 9;
   vec3 sum = vec3(0.0);
   float total = 0.0;
   for (int corner = 0; corner < 8; corner++) {
@@ -93,62 +109,44 @@ vec3 rtgiVolumeIrradiance(int volume, vec3 offset, vec3 lattice, vec3 normal, ve
       continue;
     }
     int index = (cell.z * (last.y + 1) + cell.y) * (last.x + 1) + cell.x;
-    ivec2 texel = rtgiTexel(rtgiResolution[volume].w + index, perRow) * ivec2(9, 1);
-    vec4 c0 = texelFetch(rtgiProbes, texel, 0);
-    vec4 c1 = texelFetch(rtgiProbes, texel + ivec2(1, 0), 0);
-    vec4 c2 = texelFetch(rtgiProbes, texel + ivec2(2, 0), 0);
-    vec4 c3 = texelFetch(rtgiProbes, texel + ivec2(3, 0), 0);
-    vec3 place = (rtgiOffsetFromLattice[volume] * vec4(cell, 1.0)).xyz + vec3(c0.w, c1.w, c2.w);
-    vec3 towards = place - offset;
-    float distance = length(towards);
-    float cosine = distance > 0.0 ? dot(towards, normal) / max(distance, RTGI_TINY) : 1.0;
-    float wrapped = 0.5 * (cosine + 1.0);
-    float seen = (wrapped * wrapped + 0.2) * rtgiVisibility(volume, index, biased - place);
-    seen = seen < 0.2 ? seen * seen * seen / 0.04 : seen;
-    float weight = trilinear * ((c3.w != 0.0 ? seen + 1e-4 : 0.0) + 1e-12);
-    total += weight;
-    vec3 irradiance = basis[0] * c0.rgb + basis[1] * c1.rgb + basis[2] * c2.rgb + basis[3] * c3.rgb;
-    for (int i = 4; i < 9; i++) {
-      irradiance += basis[i] * texelFetch(rtgiProbes, texel + ivec2(i, 0), 0).rgb;
+#ifdef RTGI_SCATTERED
+    if (rtgiNodes[volume].y != 0) {
+      vec4 words = texelFetch(rtgiWords, rtgiTexel(rtgiNodes[volume].x + index, textureSize(rtgiWords, 0).x), 0);
+      for (int slot = 0; slot < 4; slot++) {
+        float word = words[slot];
+        if (word != 0.0) {
+          rtgiAdd(volume, rtgi_word_probe(word), vec3(0.0), trilinear * rtgi_word_share(word), word > 0.0, offset, surfaceNormal,
+            basis, sum, total);
+        }
+      }
+      continue;
     }
-    sum += weight * irradiance;
+#endif
+    rtgiAdd(volume, index, (rtgiOffsetFromLattice[volume] * vec4(cell, 1.0)).xyz, trilinear, true, offset, surfaceNormal, basis,
+      sum, total);
   }
   return max(sum / total, 0.0);
 }
 
-// 1 inside the volume, falling to 0 over its outermost cell.
-float rtgiCoverage(int volume, vec3 lattice) {
-  vec3 resolution = vec3(rtgiResolution[volume].xyz);
-  vec3 depth = min(lattice + 0.5, resolution - 0.5 - lattice) / min(0.5 * resolution, 1.0);
-  return clamp(min(depth.x, min(depth.y, depth.z)), 0.0, 1.0);
-}
-
 // Irradiance at a point of the probes' space on a surface whose geometry faces surfaceNormal and whose shading faces normal.
 vec3 rtgiIrradiance(vec3 position, vec3 normal, vec3 surfaceNormal) {
-  // The harmonics, convolved with the cosine lobe.
-  float basis[9];
-  basis[0] = 0.88622693;
-  basis[1] = 1.02332671 * normal.y;
-  basis[2] = 1.02332671 * normal.z;
-  basis[3] = 1.02332671 * normal.x;
-  basis[4] = 0.85808553 * normal.x * normal.y;
-  basis[5] = 0.85808553 * normal.y * normal.z;
-  basis[6] = 0.74312386 * normal.z * normal.z - 0.24770796;
-  basis[7] = 0.85808553 * normal.x * normal.z;
-  basis[8] = 0.42904277 * (normal.x + normal.y) * (normal.x - normal.y);
+  vec4 first, second;
+  float ninth;
+  rtgi_cosine_basis(normal, first, second, ninth);
+  float basis[9] = float[9](first.x, first.y, first.z, first.w, second.x, second.y, second.z, second.w, ninth);
   float share[RTGI_VOLUMES];
   float total = 0.0;
   float left = 1.0;
   int nearest = 0;
   float nearestDistance = 3.402823e38;
   for (int volume = 0; volume < RTGI_VOLUMES; volume++) {
-    vec3 lattice = (rtgiLatticeFromOffset[volume] * vec4(position - rtgiCentre[volume].xyz, 1.0)).xyz;
-    float covered = rtgiCoverage(volume, lattice);
+    vec3 lattice = rtgiLattice(volume, position - rtgiCentre[volume].xyz);
+    vec3 resolution = vec3(rtgiResolution[volume].xyz);
+    float covered = rtgi_coverage(lattice, resolution);
     share[volume] = left * covered;
     left *= 1.0 - covered;
     total += share[volume];
-    vec3 inside = clamp(lattice, vec3(-0.5), vec3(rtgiResolution[volume].xyz) - 0.5);
-    float distance = length(mat3(rtgiOffsetFromLattice[volume]) * (inside - lattice));
+    float distance = length(mat3(rtgiOffsetFromLattice[volume]) * rtgi_to_box(lattice, resolution));
     nearest = distance < nearestDistance ? volume : nearest;
     nearestDistance = min(distance, nearestDistance);
   }
@@ -158,9 +156,7 @@ vec3 rtgiIrradiance(vec3 position, vec3 normal, vec3 surfaceNormal) {
   vec3 sum = vec3(0.0);
   for (int volume = 0; volume < RTGI_VOLUMES; volume++) {
     if (share[volume] > 0.0) {
-      vec3 offset = position - rtgiCentre[volume].xyz;
-      vec3 lattice = (rtgiLatticeFromOffset[volume] * vec4(offset, 1.0)).xyz;
-      sum += share[volume] * rtgiVolumeIrradiance(volume, offset, lattice, normal, surfaceNormal, basis);
+      sum += share[volume] * rtgiVolumeIrradiance(volume, position - rtgiCentre[volume].xyz, surfaceNormal, basis);
     }
   }
   return sum / total;
@@ -197,20 +193,21 @@ const fragmentMain = /* glsl */ `
 const splices = [
   ['vertexShader', 'common', '', vertexPars],
   ['vertexShader', 'project_vertex', '', vertexMain],
-  ['fragmentShader', 'lights_pars_begin', '', fragmentPars],
+  ['fragmentShader', 'lights_pars_begin', '', fragmentPars + DECLARED],
   ['fragmentShader', 'lights_fragment_begin', '#undef USE_LIGHT_PROBES\n', ''],
-  ['fragmentShader', 'lights_fragment_maps', '', fragmentMain],
+  ['fragmentShader', 'lights_fragment_maps', '', fragmentMain + LIT],
 ];
 
-// Splice the look-up of `volumes` volumes into `shader`, as onBeforeCompile receives it. `name` is the material's, for errors.
+// Splice the look-up of `volumes` into `shader`, as onBeforeCompile receives it. `name` is the material's, for errors.
 export function spliceProbes(shader, volumes, name) {
+  const scattered = volumes.some(({ probes }) => probes !== undefined) ? '#define RTGI_SCATTERED\n' : '';
   for (const [stage, chunk, before, after] of splices) {
     const include = `#include <${chunk}>`;
     if (!shader[stage].includes(include)) {
       throw new Error(`RTGI: the ${stage} of material "${name}" has no ${include}, after which the probes are read: ` +
         'use a built-in lit material of three 0.160 or later, and apply the probes before other changes of its shader');
     }
-    const define = chunk === 'lights_pars_begin' ? `#define RTGI_VOLUMES ${volumes}\n` : '';
+    const define = chunk === 'lights_pars_begin' ? `#define RTGI_VOLUMES ${volumes.length}\n${scattered}` : '';
     shader[stage] = shader[stage].replace(include, () => `${before}${include}\n${define}${after}`);
   }
 }

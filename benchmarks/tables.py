@@ -1,0 +1,133 @@
+"""The tables of benchmarks/README.md in one go, on one commit: runs one script after the other and keeps what each prints.
+
+    python benchmarks/tables.py [--only NAME…] [--skip NAME…] [--minutes 25] [--list]
+
+Made for two idle cores, where it takes some 25 minutes: it stops beginning new tables when --minutes are over, says which are
+missing, and goes on with those the next time unless --again is given or the commit has changed. Tables of hours (`make charts`), of
+files that are not in this repository (real_scenes.py) and of a window or GPU (preview.py, preview_vs_cycles.py, rsm_capture.py,
+gpu_kernels.py) are not among them. Results lie in benchmarks/results/tables, one file a table with the load of the machine before
+and after it, and together in all.txt, ready to be pasted.
+"""
+
+import argparse
+import os
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).resolve().parents[1]
+RESULTS = ROOT / "benchmarks/results/tables"
+# What Blender's module says of files, and numpy of forks, between a script's own lines.
+_NOISE = re.compile(r"^\d\d:\d\d\.\d+ |^Error: Not freed|DeprecationWarning|^  child = ")
+# Above so much load before it begins, a table says that its machine was busy.
+_IDLE = 0.7
+
+
+class Table(NamedTuple):
+    """One table: the ``section`` of the README that it is for, the script with its arguments, and the minutes that it takes."""
+
+    section: str
+    command: str
+    minutes: float
+
+
+# Those that goals are held to come first.
+TABLES = {
+    "rates": Table("Rays per second", "ray_rate.py --runs 1", 2.5),
+    "panoramas": Table("Bake against Cycles panoramas", "bake_vs_cycles.py cornell_box sky_courtyard sun_window "
+                       "--method panorama --quick --reference-seconds 20", 7.0),
+    "atrium": Table("Bake against Cycles panoramas", "bake_vs_cycles.py atrium --probes 2048 "
+                    "--method panorama --quick --reference-seconds 20", 3.0),
+    "relight": Table("Relighting", "relight.py --repeats 1", 1.5),
+    "scale": Table("Large bakes", "scale.py --probes 2500 10000", 0.7),
+    "vpl": Table("Instant radiosity", "vpl.py rate --runs 3", 2.0),
+    "lpv": Table("Light propagation volumes", "lpv.py", 0.3),
+    "accuracy": Table("Accuracy at default settings", "accuracy.py --seeds 2", 2.5),
+    "memory": Table("Memory", "memory.py", 1.5),
+    "techniques": Table("Techniques against the path reference", "technique_errors.py --techniques probes vpl rsm lpv", 1.5),
+    "transfer": Table("From transfer", "transfer.py", 0.5),
+    "without": Table("Without Embree", "without_embree.py cornell_box two_rooms", 0.6),
+    "linear": Table("Cost by size", "linear_cost.py --runs 3", 0.7),
+    "live": Table("Live probes", "live_probes.py sample_blends/cornell_box.blend sample_blends/atrium.blend", 0.7),
+    "voxels": Table("Voxels", "voxels.py", 1.5),
+}
+
+
+def commit() -> str:
+    """The commit of the tree, with a mark where files differ from it."""
+    def git(*words: str) -> str:
+        return subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True, check=False).stdout.strip()
+    return (git("rev-parse", "--short=12", "HEAD") or "unknown") + (" and changes" if git("status", "--porcelain", "-uno") else "")
+
+
+def load() -> float:
+    """The load of the last minute; 0 where the system does not tell."""
+    return os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
+
+
+def measure(name: str, table: Table, head: str) -> bool:
+    """Run one script, show and keep what it prints. Whether it came to its end."""
+    before, started = load(), time.perf_counter()
+    print(f"\n## {table.section} ({name})\n\n`python benchmarks/{table.command}`\n", flush=True)
+    words = [sys.executable, str(ROOT / "benchmarks" / table.command.split()[0]), *table.command.split()[1:]]
+    lines = []
+    with subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as running:
+        for line in running.stdout:
+            if not _NOISE.search(line):
+                lines.append(line.rstrip())
+                print(lines[-1], flush=True)
+    minutes = (time.perf_counter() - started) / 60
+    busy = "" if before <= _IDLE else ", **others were at work**"
+    note = f"{minutes:.1f} min, load {before:.1f} before and {load():.1f} after{busy}"
+    print(f"\n({note})", flush=True)
+    done = running.returncode == 0
+    if done:
+        first = [head, note, f"## {table.section}", "", f"`python benchmarks/{table.command}`", ""]
+        (RESULTS / f"{name}.txt").write_text("\n".join([*first, *lines, ""]))
+    return done
+
+
+def known(name: str, head: str) -> bool:
+    """Whether the table was measured on this very commit."""
+    path = RESULTS / f"{name}.txt"
+    return path.exists() and path.read_text().splitlines()[0] == head and "changes" not in head
+
+
+def main() -> int:
+    """Measure what is missing while there is time; the number of tables that failed."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--only", nargs="+", choices=list(TABLES), default=list(TABLES))
+    parser.add_argument("--skip", nargs="+", choices=list(TABLES), default=[])
+    parser.add_argument("--minutes", type=float, default=25.0, help="begin no table that would not end by then (default 25)")
+    parser.add_argument("--again", action="store_true", help="also those that are known of this commit")
+    parser.add_argument("--list", action="store_true", help="say what there is, and how long it takes")
+    arguments = parser.parse_args()
+    if arguments.list:
+        for name, table in TABLES.items():
+            print(f"{name:12s} {table.minutes:4.1f} min  {table.command}")
+        return 0
+    RESULTS.mkdir(parents=True, exist_ok=True)
+    head, started, failed, left = commit(), time.perf_counter(), [], []
+    print(f"commit {head}, {os.cpu_count()} cores, load {load():.1f}", flush=True)
+    wanted = [name for name in arguments.only if name not in arguments.skip]
+    for name in wanted:
+        if not arguments.again and known(name, head):
+            continue
+        if (time.perf_counter() - started) / 60 + TABLES[name].minutes > arguments.minutes:
+            left.append(name)
+        elif not measure(name, TABLES[name], head):
+            failed.append(name)
+    parts = [path.read_text() for name in TABLES if (path := RESULTS / f"{name}.txt").exists()]
+    (RESULTS / "all.txt").write_text("\n".join(parts))
+    print(f"\nAll that is known is in {RESULTS / 'all.txt'}.")
+    for what, names in (("failed", failed), ("no time was left for", left)):
+        if names:
+            print(f"{what}: {', '.join(names)}")
+    return len(failed)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,8 @@
+"""Final: how media are shown (ui/media.py says what for)."""
+
+import bpy
+
+media = bpy.context.scene.rtgi_effects.effect_media
+
+media.tile = 3
+media.slices = 96

@@ -1,0 +1,8 @@
+"""Preview: how media are shown (ui/media.py says what for)."""
+
+import bpy
+
+media = bpy.context.scene.rtgi_effects.effect_media
+
+media.tile = 8
+media.slices = 64

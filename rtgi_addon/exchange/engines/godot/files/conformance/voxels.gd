@@ -1,0 +1,29 @@
+extends "checks.gd"
+## Holds cones through this export's voxels to RTGI's own numbers: voxels.gdshaderinc on the GPU, with the imported textures.
+
+const BODY := "	values[0] = rtgi_voxels_irradiance(texelFetch(table, ivec2(column, 0), 0).xyz, texelFetch(table, ivec2(column, 1), 0).xyz);"
+
+
+func _initialize() -> void:
+	var expected := _expected("voxels.json")
+	var opened := _opened("voxels.gd", "voxels") if expected else {}
+	if opened.is_empty():
+		return
+	for place: Array in PLACES:
+		for case: Dictionary in expected["cases"]:
+			var voxels: RefCounted = opened[case["voxels"]]
+			voxels.world_from_local = place[0]
+			if not _headless():
+				_report(case["name"] + ", shader" + place[1], await _by_shader(case, voxels), case["irradiance"], case["tolerance"],
+						"W/m^2")
+	_finish("the shader")
+
+
+func _by_shader(case: Dictionary, voxels: RefCounted) -> Array:
+	var columns := []
+	for row in case["points"].size():
+		columns.append([_colour(voxels.world_from_local * _vector(case["points"][row])),
+				_colour(voxels.world_from_local.basis * _vector(case["normals"][row]))])
+	var material := _material(_sources()[case["voxels"]].path_join("voxels.gdshaderinc"), 1, BODY)
+	voxels.apply_to(material)
+	return (await _shown(material, _table(columns), 1)).map(func(values: Array) -> Vector3: return values[0])

@@ -1,0 +1,183 @@
+"""The lit voxels of a bundle made ready for an engine: lists as slices of 3D textures, the shader that traces cones through them,
+and what the engine is held to.
+
+The shader is the preview's own (shaders/include/voxel_cones.glsl), with what differs between voxels as constants in front. Voxels
+keep Blender's axes; a matrix takes the engine's points there.
+"""
+
+import re
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import BakeError
+from ...techniques.voxels.shipped import HALF_MAX, ShippedVoxels, rounded
+from ...transport.voxels import VoxelGrid, Voxels, cones, rays
+from ...transport.voxels.cones import cone_set
+from ...transport.voxels.hierarchy import build_hierarchy
+from ...transport.voxels.tables import pack, row_numbers
+from ...transport.voxels.voxelize import Seen
+from ..voxel_files import lists_of
+from .axes import Axes
+from .conformance import BUNDLE, KIT, POINTS
+from .kit import unit
+
+SCHEMA = "rtgi-voxels-conformance/1"
+LISTS = ("rows", "cells", "light")
+_HERE = Path(__file__).resolve().parent
+_SHADERS = _HERE.parents[1] / "shaders" / "include"
+# Texels of a line and lines of a slice, and slices that every driver has.
+_SIDE, _SLICES = 2048, 256
+# Rows that a float tells apart, with a half.
+_MOST_ROWS = 1 << 23
+# Float32's share of what is found, and by how much points are moved to see where rounding decides [cells].
+_FLOAT, _NUDGE = 1e-3, 2e-4
+# Points whose answer changes by more than this share of the brightest are at the edge of a cell, and are not asked.
+_EDGE = 2e-3
+_NUMBERS = {"VOXEL_SPENT": rays.SPENT, "VOXEL_GAP": rays.GAP, "VOXEL_TOUCHING": rays.TOUCHING, "VOXEL_OWN_AXIS": rays.OWN_AXIS,
+            "VOXEL_OWN_PLANE": rays.OWN_PLANE, "CONE_TIGHT": cones.TIGHT, "CONE_SUPPORT": cones.SUPPORT}
+
+
+@dataclass(frozen=True, eq=False)
+class EngineVoxels:
+    """``source`` along an engine's ``axes``."""
+
+    source: ShippedVoxels
+    axes: Axes
+
+    @property
+    def slices(self) -> dict[str, np.ndarray]:
+        """The lists by name: (slices, lines, texels, channels), rows in float32 and one channel, the others in float16 and four."""
+        lists = lists_of(self.source.tables)
+        lists["rows"] = row_numbers(self.source.tables).reshape(-1, 1, 1), 1
+        return {name: _slices(items, texels) for name, (items, texels) in lists.items()}
+
+    @property
+    def cells_from_world(self) -> np.ndarray:
+        """(4, 4) float64: places in cells of points of the engine's world."""
+        grid, matrix = self.source.tables.grid, np.eye(4)
+        matrix[:3, :3] = self.axes.blender_from_engine / (self.axes.scale * grid.cell)
+        matrix[:3, 3] = -np.asarray(grid.corner) / grid.cell
+        return matrix
+
+    def irradiance(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """(n, 3): what the engine is to find at its ``points`` (n, 3) under its unit ``normals`` (n, 3)."""
+        turn = self.axes.blender_from_engine
+        return self.source.irradiance(points @ turn.T / self.axes.scale, (normals @ turn.T).astype(np.float32)).astype(np.float64)
+
+
+def engine_voxels(voxels: ShippedVoxels | None, axes: Axes) -> EngineVoxels | None:
+    """``voxels`` along ``axes``; None for none. Raises BakeError for more of them than textures hold, and brighter ones."""
+    if voxels is None:
+        return None
+    if voxels.tables.light.dtype != np.float16:
+        raise BakeError(f"a voxel is brighter than half floats hold ({HALF_MAX:.0f} W/(sr m^2))",
+                        "scale the scene's lights down and raise the engine's exposure by as much")
+    most = max(len(voxels.tables.rows), len(voxels.tables.cells) * 8)
+    if len(voxels.tables.cells) >= _MOST_ROWS or most > _SIDE * _SIDE * _SLICES:
+        raise BakeError(f"the voxel grid has {len(voxels.tables.rows):,} cells and {len(voxels.tables.cells):,} voxels that hold "
+                        "surfaces, more than textures of engines take", "bake it with a lower resolution")
+    return EngineVoxels(voxels, axes)
+
+
+def notes_on_voxels(voxels: EngineVoxels | None) -> list[str]:
+    """What a user should know of ``voxels`` in an engine."""
+    if voxels is None:
+        return []
+    size = sum(values.nbytes for values in voxels.slices.values()) / 2**20
+    return [f"voxels: {voxels.source.cones} cones a pixel through {size:.1f} MiB; they keep the light of the bake",
+            *(f"voxels in an engine leave out {what}" for what in voxels.source.left)]
+
+
+def voxels_glsl(voxels: EngineVoxels, array: str = "{kind}[{count}]({values})") -> str:
+    """Constants of these voxels, then the functions, for a shader that has ``rtgi_list_texel(sampler, item, parts, part)`` and the
+    samplers rtgi_voxel_rows, rtgi_voxel_cells, rtgi_voxel_light; ``array`` is how its language says one."""
+    tables, (directions, weights, spread) = voxels.source.tables, cone_set(voxels.source.cones)
+    defines = {**{name: float(value) for name, value in _NUMBERS.items()}, "VOXEL_LEVELS": len(tables.shapes),
+               "VOXEL_CONES": len(weights), "VOXEL_SPREAD": float(spread[0]), "VOXEL_STEP": float(voxels.source.step),
+               "VOXEL_NEAR": float(voxels.source.near)}
+    text = "".join(f"#define RTGI_{name} {value!r}\n" for name, value in defines.items())
+    resolution = ", ".join(map(str, tables.grid.resolution))
+    text += f"#define RTGI_VOXEL_RESOLUTION ivec3({resolution})\n"
+    for name, kind, rows in (("LEVEL", "ivec4", tables.shapes), ("CONE", "vec4", np.column_stack([directions, weights])),
+                             ("SKY", "vec3", voxels.source.sky)):
+        values = ", ".join(f"{kind}({', '.join(_number(value) for value in row)})" for row in rows.tolist())
+        text += (f"const {kind} RTGI_VOXEL_{name}[{len(rows)}] = "
+                 f"{array.format(kind=kind, count=len(rows), values=values)};\n")
+    shader = "".join(_include(name) for name in ("voxels.glsl", "voxel_cones.glsl"))
+    return f"{text}\n{shader}\n{(_HERE / 'voxels.glsl').read_text(encoding='utf-8')}"
+
+
+def _number(value) -> str:
+    return str(value) if isinstance(value, int) else f"{value:.9e}"
+
+
+def _include(name: str) -> str:
+    """One of the preview's includes under names that leave an engine's own alone."""
+    text = (_SHADERS / name).read_text(encoding="utf-8")
+    text = re.sub(r"^#include .*\n", "", text, flags=re.MULTILINE)
+    text = text.replace("indirect.level", "RTGI_VOXEL_LEVEL").replace("indirect.resolution", "RTGI_VOXEL_RESOLUTION")
+    text = re.sub(r"\b(VOXEL|CONE)_(?=[A-Z])", r"RTGI_\1_", text)
+    text = re.sub(r"(?<!RTGI_)\b(voxel|cone|list)_(?=[a-z])", r"rtgi_\1_", text)
+    return re.sub(r"\b(Voxel|VoxelRay|VoxelsSeen|ConeSample)\b", r"RTGI\1", text)
+
+
+def _slices(items: np.ndarray, texels: int) -> np.ndarray:
+    count, _, channels = items.shape
+    per_line = _SIDE // texels
+    lines = -(-count // per_line)
+    slices = -(-lines // _SIDE)
+    height = -(-lines // slices)
+    wide = min(count, per_line)
+    held = np.zeros((slices * height * wide, texels, 1 if channels == 1 else 4), items.dtype)
+    held[:count, :, :channels] = items
+    return held.reshape(slices, height, wide * texels, -1)
+
+
+@cache
+def kit_voxels(axes: Axes) -> EngineVoxels:
+    """Voxels of every kind at random: sheets that lie any way, solid ones that lie in no plane, and ones that let light through."""
+    rng, grid = np.random.default_rng(41), VoxelGrid((-3.0, -2.0, -2.5), 0.5, (12, 9, 10))
+    cells = np.sort(rng.permutation(grid.count)[:grid.count // 6])
+    count, kind = len(cells), rng.integers(3, size=len(cells))
+    normal = unit(rng.normal(size=(count, 3)))
+    x, y, z = normal.T
+    lie = np.stack([x * x, y * y, z * z, y * z, x * z, x * y], axis=1)
+    lie[kind != 0] = (1 / 3, 1 / 3, 1 / 3, 0.0, 0.0, 0.0)
+    opacity = np.where(kind[:, None] == 2, rng.uniform(0.1, 0.6, (count, 3)), rng.uniform(0.6, 1.0, (count, 3)))
+    opacity = np.where(kind[:, None] == 0, np.minimum(np.abs(normal) * 1.2, 1.0), opacity).astype(np.float32)
+    area = np.where(kind == 0, 1.0, rng.uniform(0.3, 1.5, count)) * grid.cell**2
+    nothing = np.zeros(0, int)
+    middle = 0.3 * (rng.random((count, 3)) - 0.5)
+    voxels = Voxels(grid, cells, opacity, area, normal, np.zeros((count, 3)), lie, middle, kind != 2,
+                    Seen(*(nothing for _ in range(6))))
+    radiance = (rng.random((count, 6, 3)) * np.repeat(opacity, 2, axis=1)[:, :, None]).astype(np.float32)
+    sky = np.concatenate([[[1.5, 1.8, 2.2]], 0.2 * rng.normal(size=(8, 3))])
+    tables = rounded(pack(build_hierarchy(voxels, radiance)))
+    return EngineVoxels(ShippedVoxels(tables, 16, 0.5, 3.0, sky), axes)
+
+
+def conformance_json(voxels: EngineVoxels) -> dict:
+    """The contents of an export's conformance file of its voxels."""
+    return {"schema": SCHEMA, "unit": "W/m^2", "cases": [_case("kit, voxels", KIT, kit_voxels(voxels.axes)),
+                                                       _case("bundle, voxels", BUNDLE, voxels)]}
+
+
+def _case(name: str, source: str, voxels: EngineVoxels) -> dict:
+    """POINTS points of the grid with normals, clear of places where rounding decides which cell a ray meets."""
+    rng, grid = np.random.default_rng(42), voxels.source.tables.grid
+    inside = rng.uniform(0.02, 0.98, (POINTS + POINTS // 2, 3)) * (grid.high - grid.corner) + grid.corner
+    points = voxels.axes.vectors(inside).astype(np.float32).astype(np.float64)
+    normals = unit(rng.normal(size=points.shape)).astype(np.float32).astype(np.float64)
+    found, spread = voxels.irradiance(points, normals), np.zeros(points.shape)
+    for _ in range(2):
+        moved = points + _NUDGE * grid.cell * voxels.axes.scale * rng.normal(size=points.shape)
+        turned = unit(normals + _NUDGE * rng.normal(size=points.shape))
+        spread = np.maximum(spread, np.abs(voxels.irradiance(moved, turned) - found))
+    kept = np.flatnonzero(spread.max(axis=1) < _EDGE * max(found.max(initial=0.0), 1e-9))[:POINTS]
+    tolerance = spread[kept] + _FLOAT * (found[kept] + 0.05 * found.max(initial=0.0)) + 1e-9
+    return {"name": name, "voxels": source, **{key: [[float(f"{value:.9g}") for value in row] for row in values]
+                                               for key, values in (("points", points[kept]), ("normals", normals[kept]),
+                                                                   ("irradiance", found[kept]), ("tolerance", tolerance))}}

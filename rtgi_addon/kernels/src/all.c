@@ -1,0 +1,11 @@
+/* One variant of every kernel. */
+
+#include "connect.c"
+#include "directions.c"
+#include "gather.c"
+#include "lamps.c"
+#include "rays.c"
+#include "ringing.c"
+#include "sampling.c"
+#include "surfaces.c"
+#include "texels.c"

@@ -1,0 +1,2 @@
+#include "include/irradiance_cone_tracing.glsl"
+#include "include/indirect_frame.glsl"

@@ -1,0 +1,2 @@
+#include "include/irradiance_voxel_march.glsl"
+#include "include/indirect_frame.glsl"

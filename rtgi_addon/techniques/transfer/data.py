@@ -1,0 +1,83 @@
+"""What a bake of transfer leaves: for every probe, what it makes of any light."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ...numerics import dome
+from ...scene import World
+from ..base import ProbeGrid
+
+# The matrices of a probe by the names of their files, and whether they are colours; LIGHTS are always stored in whole floats.
+SKY, BOUNCE, SUNS, SEEN, LIGHTS, LOCAL = "sky", "bounce", "suns", "seen", "lights", "local"
+COLOURED = (BOUNCE, SUNS, LIGHTS, LOCAL)
+
+
+@dataclass(frozen=True, eq=False)
+class TransferGrid:
+    """The transfer of one volume's probes to their SH coefficients, k of them.
+
+    ``grid`` is the light as it was baked. The matrices, all float32: ``sky`` (nz, ny, nx, k, S) takes the sky's coefficients to
+    what of the sky the probe sees, without colour; the others have red, green and blue first: ``bounce`` (3, nz, ny, nx, k, S)
+    what surfaces reflect of it; ``suns`` (3, nz, ny, nx, k, K) what surfaces reflect of a sun of irradiance 1 from each of the K
+    directions, and ``seen`` (nz, ny, nx, K) how much of such a sun the probe sees; ``lights`` (3, nz, ny, nx, k, G) the light of
+    each of the bake's own lights; ``local`` (3, nz, ny, nx, k, J) what surfaces reflect of a lamp of 1 W at each of the J sites.
+    """
+
+    grid: ProbeGrid
+    sky: np.ndarray
+    bounce: np.ndarray
+    suns: np.ndarray
+    seen: np.ndarray
+    lights: np.ndarray
+    local: np.ndarray
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """(nz, ny, nx)."""
+        return self.seen.shape[:3]
+
+    @property
+    def coefficients(self) -> int:
+        """k."""
+        return self.lights.shape[4]
+
+
+@dataclass(frozen=True, eq=False)
+class Transfer:
+    """The ``grids`` of a bake, and what their columns mean.
+
+    ``order`` of the probes, ``sky_order`` of skies, ``sun_side`` and ``sun_below`` of the suns' directions (numerics/dome.py);
+    ``lights`` are (name, kind) of each column of the bake's own lights; ``sites`` (J, 3) in the world. ``world`` is the world that
+    was baked, coarsely; ``surfaces`` are hashes by the names of what transfer depends on, ``sources`` what shone (follow.py);
+    ``half`` whether it is to be stored in 16 bits.
+    """
+
+    grids: tuple[TransferGrid, ...]
+    order: int
+    sky_order: int
+    sun_side: int
+    sun_below: bool
+    lights: tuple[tuple[str, str], ...]
+    sites: np.ndarray
+    world: World
+    surfaces: dict[str, str] = field(default_factory=dict)
+    sources: dict[str, dict] = field(default_factory=dict)
+    half: bool = True
+
+    @property
+    def sun_directions(self) -> np.ndarray:
+        """Directions (K, 3) towards the suns."""
+        return dome.directions(self.sun_side, self.sun_below)
+
+    @property
+    def bytes_per_probe(self) -> int:
+        """What the transfer of one probe takes as it is stored, before compression."""
+        return stored_bytes(self.order, self.sky_order, len(self.sun_directions), len(self.sites), len(self.lights), self.half)
+
+
+def stored_bytes(order: int, sky_order: int, suns: int, sites: int, lights: int, half: bool) -> int:
+    """What the transfer of one probe of an ``order`` takes as it is stored, before compression."""
+    k, sky = (order + 1) ** 2, (sky_order + 1) ** 2
+    numbers = 4 * k * sky + suns * (3 * k + 1) + 3 * k * sites
+    return numbers * (2 if half else 4) + 4 * 3 * k * lights

@@ -1,0 +1,179 @@
+"""Radiance along any rays, with the light of what they hit read from a surface cache: what pictures see of a scene."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...progress import Progress
+from ..context import LightContext
+from ..paths.direct import Receiver, sample_environment
+from ..paths.numbers import PathNumbers
+from ..rays.tracer import offset_origins
+from ..vectors import dot
+from .hit_light import HitLight, HitRays
+from .surface_cache import SurfaceCache
+from .texel_table import SurfaceHits
+from .texels import Focus, TexelLayout, size_for
+
+# Texels around what a picture shows, rays from each, and by how much direct light may vary over one that counts as smooth: as a
+# bake to half a per cent has them. Every pixel looks at many, so their noise is a small part of its own.
+TEXELS, RAYS, SMOOTHNESS = 24000, 128, 0.05
+# The solution may be off by this share.
+TOLERANCE = 1e-3
+# What numbers a ray draws beside those of transport.paths.numbers: lamps at its hit, and a point of the bright surfaces.
+_AT_HIT, _BRIGHT_SURFACES = 16, 17
+# Density of cosine-distributed rays per projected solid angle.
+_COSINE_DENSITY = 1.0 / np.pi
+
+
+@dataclass(frozen=True, eq=False)
+class Looks:
+    """Rays from ``origins`` (n, 3) along unit ``directions`` (n, 3), with ``numbers`` for them, and what they met: ``rows`` (h,) of
+    those that ``hits`` (h,) surfaces, ``t`` (h,) [m] away, ``fronts`` (h, 3) the normals there, ``tint`` (n, 3) of what comes along
+    (None: unchanged). ``density`` (n,) [1/sr] is what they were drawn with, None where no other samples compete with them;
+    ``depth`` how many surfaces the paths had met before."""
+
+    origins: np.ndarray
+    directions: np.ndarray
+    numbers: PathNumbers
+    rows: np.ndarray
+    hits: SurfaceHits
+    t: np.ndarray
+    fronts: np.ndarray
+    tint: np.ndarray | None
+    density: np.ndarray | None
+    depth: int = 0
+
+    def of(self, chosen: np.ndarray) -> "Looks":
+        """Those of the rays that are ``chosen`` (n,) bool."""
+        position, kept = np.cumsum(chosen) - 1, chosen[self.rows]
+        optional = (None if part is None else part[chosen] for part in (self.tint, self.density))
+        return Looks(self.origins[chosen], self.directions[chosen], self.numbers.take(chosen), position[self.rows[kept]],
+                     self.hits.take(kept), self.t[kept], self.fronts[kept], *optional, self.depth)
+
+
+class CachedScene:
+    """A scene whose surfaces hold their light, accurate about a sphere of ``radius`` [m] around ``center_world`` (3,).
+
+    Rays are looked along in three steps: ``look``, by any number of threads; ``settle``, once for all of them, which brings into
+    the cache what they met; ``radiance``, by threads again. The same for any number of threads.
+    """
+
+    def __init__(self, context: LightContext, center_world: np.ndarray, radius: float, seed: int = 0):
+        self.context = context
+        size = size_for(context.geometry, center_world, radius, TEXELS)
+        lit_alike = context.links.lit_alike if context.links.has_receivers else None
+        layout = TexelLayout(context.geometry, Focus(center_world, radius, size), lit_alike)
+        self.cache = SurfaceCache(context, layout, seed, RAYS, smoothness=SMOOTHNESS)
+        self._hit_light = HitLight(self.cache)
+        # Where everything glows, samples of it add nothing but noise.
+        self._samples_emitters = self.cache.emitter_samples > 0
+
+    def look(self, origins: np.ndarray, directions: np.ndarray, numbers: PathNumbers,
+             density: np.ndarray | None = None, depth: int = 0) -> Looks:
+        """Trace rays (n,) that leave surfaces; see Looks."""
+        hits = self.context.tracers.diffuse.intersect(origins, directions)
+        rows = np.flatnonzero(hits.primitive >= 0)
+        primitive, u, v = hits.primitive[rows], hits.u[rows], hits.v[rows]
+        fronts = self.context.geometry.normals_world[primitive]
+        slots = self.cache.layout.slots(primitive, u, v, dot(fronts, directions[rows]) < 0)
+        return Looks(origins, directions, numbers, rows, SurfaceHits(primitive, u, v, slots), hits.t[rows], fronts, hits.tint,
+                     density, depth)
+
+    def settle(self, looks: list[Looks], progress: Progress | None = None) -> list[np.ndarray]:
+        """The texel (h,) of every hit of each of ``looks``, with the light on all of them known. Raises BakeError where there is
+        not the memory for it, and Cancelled."""
+        progress = progress or Progress()
+        texels = self.cache.reach([look.hits for look in looks], progress)
+        self.cache.solve(None, TOLERANCE, progress)
+        return texels
+
+    def radiance(self, look: Looks, texel: np.ndarray, albedo: np.ndarray | None = None,
+                 unlit: np.ndarray | None = None) -> np.ndarray:
+        """Radiance (n, 3) [W·sr⁻¹·m⁻²] along the rays of ``look``; ``albedo`` (h, 3) of the hits, None for all that they reflect in
+        the mean over directions. Where rays have a density it is weighted against what ``sampled_irradiance`` finds as well, and
+        leaves bright patches of the world to it; rays that are ``unlit`` (n,) bool leave to
+        ``light_samples`` all that those sample."""
+        surfaces, environment, rays = self.context.surfaces, self.context.environment, _LookRays(look)
+        every, hits = np.arange(len(look.rows)), look.hits
+        result = np.zeros(look.directions.shape, np.float32)
+        if albedo is None:
+            albedo = surfaces.albedo(hits.primitive, hits.u, hits.v, rays.cosine(every))
+        seen = self._hit_light.reflected(hits, texel, albedo, rays)
+        if surfaces.has_emission:
+            emitted = self._emitted(look, rays)
+            left_out = unlit is not None and self._samples_emitters
+            seen = seen + (emitted if not left_out else np.where(unlit[look.rows, None], np.float32(0.0), emitted))
+        result[look.rows] = seen
+        if not environment.is_black:
+            missed = np.ones(len(result), bool)
+            missed[look.rows] = False
+            result[missed] = environment.base_radiance(look.directions[missed])
+            if environment.bright.count and look.density is None:
+                shown = missed if unlit is None else missed & ~unlit
+                result[shown] += environment.bright.radiance(look.directions[shown])
+        return result if look.tint is None else result * look.tint
+
+    def _emitted(self, look: Looks, rays: "_LookRays") -> np.ndarray:
+        surfaces, emitters, result = self.context.surfaces, self.context.emitters, np.zeros((len(look.rows), 3), np.float32)
+        rows = np.flatnonzero(surfaces.emissive[self.context.geometry.material[look.hits.primitive]])
+        hits = look.hits.take(rows)
+        result[rows] = surfaces.emission(hits.primitive, hits.u, hits.v, rays.cosine(rows))
+        if look.density is not None and self._samples_emitters:
+            result[rows] *= rays.share(rows, emitters.pdf_area(hits.primitive, hits.u, hits.v))
+        return result
+
+    def light_samples(self, points: np.ndarray, receiver: Receiver, numbers: PathNumbers,
+                      per_ray: float) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Directions (n, 3) and irradiance (n, 3) of one sample each of emissive surfaces, unless rays find these better, and of
+        bright patches of the world; weighted against ``per_ray`` rays of density cosθ/π."""
+        off = offset_origins(points, receiver.face, receiver.face)
+        return sample_environment(self.context, off, numbers, 0, per_ray, receiver, self._samples_emitters)
+
+    def sampled_irradiance(self, points: np.ndarray, receiver: Receiver, numbers: PathNumbers) -> np.ndarray:
+        """An estimate (n, 3) [W·m⁻²] of what emissive and brightly lit surfaces and bright patches of the world give ``points``
+        (n, 3) on surfaces: one sample each, weighted against one ray of density cosθ/π."""
+        result = np.zeros(points.shape, np.float32)
+        for samples in (self.light_samples(points, receiver, numbers, 1.0), self.bright_samples(points, receiver, numbers)):
+            for _, irradiance in samples:
+                result += irradiance
+        return result
+
+    def bright_samples(self, points: np.ndarray, receiver: Receiver,
+                       numbers: PathNumbers) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """As ``light_samples`` of one ray, of brightly lit surfaces, if there are any."""
+        if self.cache.bright.count:
+            chosen = numbers.draw(0, _BRIGHT_SURFACES, 1)[:, 0]
+            yield self.cache.bright.connect(chosen, points, 1.0, _COSINE_DENSITY, (receiver.shading, receiver.face))
+
+
+@dataclass(frozen=True, eq=False)
+class _LookRays(HitRays):
+    """Looks as HitLight asks about them; see HitRays."""
+
+    looks: Looks
+
+    def take(self, rows: np.ndarray) -> "_LookRays":
+        look = self.looks
+        return _LookRays(replace(look, rows=look.rows[rows], hits=look.hits.take(rows), t=look.t[rows], fronts=look.fronts[rows]))
+
+    def points(self, rows: np.ndarray) -> np.ndarray:
+        ray = self.looks.rows[rows]
+        return self.looks.origins[ray] + self.looks.directions[ray] * self.reach(rows)[:, None]
+
+    def reach(self, rows: np.ndarray) -> np.ndarray:
+        return self.looks.t[rows]
+
+    def cosine(self, rows: np.ndarray) -> np.ndarray:
+        return -dot(self.looks.fronts[rows], self.looks.directions[self.looks.rows[rows]])
+
+    def numbers(self, rows: np.ndarray, count: int) -> np.ndarray:
+        return self.looks.numbers.take(self.looks.rows[rows]).draw(self.looks.depth, _AT_HIT, count)
+
+    def share(self, rows: np.ndarray, pdf_area: np.ndarray) -> np.ndarray:
+        if self.looks.density is None:
+            return np.ones((len(rows), 1), np.float32)
+        density = self.looks.density[self.looks.rows[rows]]
+        by_ray = density * np.abs(self.cosine(rows)) / np.maximum(self.reach(rows) ** 2, np.float32(1e-20))
+        return (by_ray / np.maximum(by_ray + pdf_area, 1e-30))[:, None]

@@ -1,0 +1,46 @@
+"""The surface cache under other lamps and another world, without a new form-factor ray."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...progress import Progress
+from ..context import LightContext
+from ..parallel import parallel_for
+from .light_changes import FEW_CHANGES, changed_sources
+from .surface_cache import SurfaceCache, Traced
+from .texel_light import ALL_SOURCES
+from .texel_rows import TexelRows
+
+
+def relit_cache(cache: SurfaceCache, context: LightContext, progress: Progress) -> SurfaceCache:
+    """The same texels and hits as in ``cache`` under the lamps and world of ``context``, for ``solve`` with ``bright`` False.
+
+    Direct light is known as its mean over each texel alone: ``smooth`` is True throughout.
+    """
+    rows = replace(cache.rows, smooth=np.ones_like(cache.rows.smooth))
+    other = cache.under(context, Traced(cache.table, cache.form_factors, rows))
+    world_changed = context.environment is not cache.context.environment
+    gone, came = changed_sources(cache.context, context)
+    few = other.sources.count > ALL_SOURCES and len(gone) + len(came) <= FEW_CHANGES
+    spans = cache.form_factors.spans()
+
+    def work(i):
+        texels = np.arange(spans[i].start, spans[i].stop)
+        slots = cache.table.slots[texels]
+        surface = cache.sampler.on_texels(texels, cache.points if world_changed else cache.lamp_samples)
+        sky = rows.irradiance_sky[texels]
+        if world_changed:
+            sky = other.sky_again(slots, surface, i)
+        limited = other.light.limited(slots, surface)
+        if not few:
+            return sky, other.light.direct(slots, surface).irradiance, limited
+        direct = rows.irradiance_direct[texels] + other.light.mean(came, slots, surface)
+        return sky, direct - cache.light.mean(gone, slots, surface), limited
+
+    parts = parallel_for(work, len(spans), context.threads, progress, "direct light on the surface cache")
+    none = TexelRows.none(len(other.light.limits))
+    lasts = none.irradiance_sky, none.irradiance_direct, none.irradiance_limited
+    sky, direct, limited = (np.concatenate([*(part[column] for part in parts), last]) for column, last in enumerate(lasts))
+    other.rows = replace(rows, irradiance_sky=sky, irradiance_direct=direct, irradiance_limited=limited)
+    return other

@@ -1,0 +1,111 @@
+"""Objects in the light atlas as they are read, the operator that unwraps them, and the whole way from a file to a bundle."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+import rtgi_addon
+from rtgi_addon.blender.extract import extract_scene
+from rtgi_addon.blender.fingerprint import fingerprint
+from rtgi_addon.effects.atlas.bake import require_atlas
+from rtgi_addon.effects.atlas.settings import AtlasSettings
+from rtgi_addon.effects.atlas.unwrapped import lay_out, places_of
+from rtgi_addon.transport.surfaces.geometry import flatten
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+@pytest.fixture
+def cubes(empty_blend):
+    rtgi_addon.register()
+    found = []
+    for number in range(2):
+        bpy.ops.mesh.primitive_cube_add(location=(4.0 * number, 0.0, 0.0))
+        found.append(bpy.context.object)
+        found[-1].data.uv_layers.new(name="Extra")
+    yield found
+    rtgi_addon.unregister()
+
+
+def read():
+    bpy.context.view_layer.update()
+    return extract_scene()
+
+
+def test_what_is_in_the_atlas_keeps_its_maps(cubes):
+    cubes[1].rtgi.atlas, cubes[1].rtgi.atlas_uv = True, "Extra"
+    scene = read()
+    by_name = {item.name: item for item in scene.instances}
+    assert [by_name[obj.name].atlas for obj in cubes] == [None, "Extra"]
+    maps = [list(scene.meshes[by_name[obj.name].mesh].uv_layers) for obj in cubes]
+    assert maps == [[], ["UVMap", "Extra"]]
+
+
+def test_unwrapping_gives_a_map_that_can_be_baked(cubes):
+    cubes[0].scale = (2.0, 1.0, 0.5)
+    bpy.context.view_layer.update()
+    for obj in cubes:
+        obj.select_set(True)
+    shown = cubes[0].data.uv_layers[0].name
+    assert bpy.ops.rtgi.unwrap_atlas() == {"FINISHED"}
+    scene = read()
+    require_atlas(scene, AtlasSettings())
+    geometry = flatten(scene)
+    sheet = lay_out(scene, geometry, AtlasSettings())
+    assert [part.uv_map for part in sheet.parts] == ["Lightmap", "Lightmap"] and {part.texcoord for part in sheet.parts} == {2}
+    for part in sheet.parts:
+        places = places_of(part, sheet, scene, geometry)
+        area = geometry.areas[geometry.instance == part.instance].sum()
+        assert abs(len(places.texel) / 16 / 64 / area - 1.0) < 0.05
+        assert len(np.unique(places.triangle)) == 12
+    assert next(layer.name for layer in cubes[0].data.uv_layers if layer.active_render) == shown
+    assert all(obj.select_get() for obj in cubes) and bpy.context.mode == "OBJECT"
+
+
+def test_the_atlas_puts_a_bake_out_of_date(cubes):
+    def digest():
+        bpy.context.view_layer.update()
+        return fingerprint(bpy.context.scene, bpy.context.evaluated_depsgraph_get())
+
+    digests = [digest()]
+    cubes[0].rtgi.atlas = True
+    digests.append(digest())
+    bpy.context.scene.rtgi.atlas.density = 20.0
+    digests.append(digest())
+    assert len(set(digests)) == 3
+
+
+def test_from_a_file_to_a_bundle(cubes, tmp_path):
+    for obj in cubes:
+        obj.select_set(obj is cubes[0])
+    bpy.ops.rtgi.unwrap_atlas()
+    cubes[0].rtgi.atlas = False
+    bpy.ops.object.light_add(type="SUN")
+    file = tmp_path / "cubes.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    out, few = str(tmp_path / "out"), ["--rays", "64", "--set", "atlas.rays=16", "--set", "atlas.density=2"]
+    assert rtgi(file, "bake", "--out", out, *few, "--atlas", cubes[0].name)[0] == 0
+    assert {path.name for path in (tmp_path / "out/atlas").iterdir()} >= {"atlas.json", "sh0.exr", "lightmap.png"}
+    code, said = rtgi(file, "bake", "--out", out, *few, "--atlas", f"{cubes[0].name}=Missing")
+    assert code == 1 and "has no UV map 'Missing': choose one of UVMap, Extra, Lightmap" in said
+
+
+def rtgi(*words):
+    ran = subprocess.run([sys.executable, "-m", "rtgi_addon", *map(str, words)], cwd=ROOT, capture_output=True, text=True,
+                         timeout=300, check=False)
+    return ran.returncode, ran.stderr
+
+
+def test_unwrapping_ends_at_low_densities(cubes):
+    """Blender's packing did not, of a thin box that few texels cover."""
+    bpy.context.scene.rtgi.atlas.density = 1.0
+    cubes[0].scale, cubes[1].scale = (2.2, 1.7, 0.1), (0.1, 0.45, 0.7)
+    bpy.context.view_layer.update()
+    for obj in cubes:
+        obj.select_set(True)
+    assert bpy.ops.rtgi.unwrap_atlas() == {"FINISHED"}
+    require_atlas(read(), AtlasSettings(density=1.0))

@@ -1,0 +1,87 @@
+"""Relighting exported to Godot, in a real Godot (see test_godot.py): held to `rtgi relight`, and its sample with a time of day."""
+
+import os
+
+import pytest
+from real_godot import complaints, drawing, godot, imported, replacing
+from transfer_bundles import transfer_bundle
+
+from rtgi_addon.exchange import engines
+
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(
+    "RTGI_GODOT" not in os.environ, reason="needs a real Godot: RTGI_GODOT is the command that starts it")]
+
+
+@pytest.fixture(scope="module")
+def project(tmp_path_factory):
+    """The kit with its transfer, exported and imported."""
+    return imported(engines.get("godot").export(transfer_bundle(), tmp_path_factory.mktemp("godot") / "kit").out)
+
+
+def relight(project, *words):
+    return godot(project, *words, "--script", "conformance/relight.gd")
+
+
+def test_scripts_agree_without_a_display(project):
+    code, said = relight(project, "--headless")
+    assert code == 0 and said.count("PASS relit") == 24 and "SKIP the shader" in said and not complaints(said), said
+
+
+@pytest.mark.parametrize("options", [("--rendering-driver", "vulkan"), ("--rendering-method", "mobile"),
+                                     ("--rendering-driver", "opengl3")], ids=["forward+", "mobile", "compatibility"])
+def test_shaders_agree(project, options):
+    code, said = relight(project, *options)
+    drawing(said)
+    assert code == 0 and said.count("PASS relit") == 48 and "FAIL" not in said and not complaints(said), said
+
+
+def test_the_probes_as_baked_are_read_through_pictures(project):
+    """The look-up of an export whose light can change reads the same numbers as any other's."""
+    code, said = godot(project, "--rendering-driver", "opengl3", "--script", "conformance/conformance.gd")
+    drawing(said)
+    assert code == 0 and "FAIL" not in said and "PASS visibility, shader, moved" in said and not complaints(said), said
+
+
+@pytest.mark.parametrize(("file", "damage", "failing"), [
+    ("relight.gdshader", replacing("36.0 * strength", "30.0 * strength"), "as it was baked, shader"),
+    ("relight.gdshader", replacing("1.09254843 * n.x * n.z", "-1.09254843 * n.x * n.z"), "a sky with bright spots, shader"),
+    ("relit.gd", replacing("f.x * (1.0 - f.y)", "f.x * (1.0 - f.x)"), "a sun at noon, script"),
+    ("relit.gd", replacing("36.0) * high", "30.0) * high"), "as it was baked, script"),
+], ids=["window", "a harmonic", "shares", "window in scripts"])
+def test_the_kit_finds_damage(project, file, damage, failing):
+    path = project / "rtgi" / file
+    whole = path.read_text()
+    try:
+        path.write_text(damage(whole))
+        code, said = relight(project, "--rendering-driver", "opengl3")
+    finally:
+        path.write_text(whole)
+    drawing(said)
+    assert code == 1 and f"FAIL relit kit, {failing}" in said, said
+
+
+def test_the_sample_follows_the_hour(project):
+    """Slider, sun, probes on the GPU, and what scripts and dynamic objects read."""
+    (project / "day_test.gd").write_text("""extends SceneTree
+func _initialize() -> void:
+	var scene: Node = (load("res://sample.tscn") as PackedScene).instantiate()
+	root.add_child(scene)
+	for frame in 10:
+		await process_frame
+	var relight: Node = scene.get_node("Relight")
+	var probes: Node = scene.get_node("Probes")
+	var light: Resource = probes.get_node("DynamicObjects").light_data
+	var before: Variant = relight._shown
+	scene.get_node("Day").hour = 12.0
+	for wait in 200:
+		await create_timer(0.05).timeout
+		if relight._shown != null and relight._shown != before and relight._in_scripts == relight._shown:
+			break
+	print("entries ", relight._shown.size() / 12, " sun ", relight._suns()[0]["towards"].y > 0.8)
+	print("followed ", relight._in_scripts == relight._shown, " light data ", probes.get_node("DynamicObjects").light_data != light)
+	quit()
+""")
+    code, said = godot(project, "--rendering-driver", "opengl3", "--script", "day_test.gd")
+    drawing(said)
+    # World and group, and four directions about the sun.
+    assert code == 0 and "entries 6 sun true" in said and "followed true light data true" in said and not complaints(said), said

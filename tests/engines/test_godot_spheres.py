@@ -1,0 +1,93 @@
+"""Sphere probes exported to Godot: the files, and what a real Godot looks up in them.
+
+RTGI_GODOT is what test_godot.py says it is.
+"""
+
+import json
+import os
+
+import numpy as np
+import pytest
+from real_godot import complaints, drawing, godot, imported, replacing
+from sphere_bundles import sphere_bundle
+
+from rtgi_addon.exchange import engines
+from rtgi_addon.exchange.exr import read_exr
+
+GODOT = engines.get("godot")
+real = pytest.mark.skipif("RTGI_GODOT" not in os.environ, reason="needs a real Godot: RTGI_GODOT is the command that starts it")
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """An export with two sphere probes, as a report."""
+    return GODOT.export(sphere_bundle(), tmp_path_factory.mktemp("spheres") / "out")
+
+
+def test_files(whole):
+    assert {"rtgi/spheres.json", "rtgi/spheres.gd", "rtgi/spheres/maps.exr", "rtgi/spheres/maps.exr.import",
+            "conformance/spheres.gd", "conformance/spheres.json", "conformance/kit/spheres.json"} <= set(whole.files)
+    index = json.loads((whole.out / "rtgi/spheres.json").read_text())
+    assert index["names"] == ["Ball", "Hall"] and len(index["table"]) == 16 and index["side"] == 32
+    planes, _ = read_exr(whole.out / "rtgi/spheres/maps.exr")
+    assert planes["R"].dtype == np.float16 and planes["R"].shape == (2 * 5 * 34, 34)
+    assert "rtgi_sphere_table[16]" in (whole.out / "rtgi/irradiance.gdshaderinc").read_text()
+    for case in json.loads((whole.out / "conformance/spheres.json").read_text())["cases"]:
+        assert len(case["points"]) == 200 and np.ptp([row[3] for row in case["radiance"]]) == 1.0
+        assert np.max(case["tolerance"]) < 0.1 * np.max(case["radiance"])
+
+
+def test_without_them_none_of_it(kit_bundle, tmp_path):
+    report = GODOT.export(kit_bundle, tmp_path / "out")
+    assert not [name for name in report.files if "sphere" in name]
+    assert "sphere" not in (report.out / "rtgi/irradiance.gdshaderinc").read_text()
+
+
+@pytest.fixture(scope="module")
+def project(whole):
+    return imported(whole.out)
+
+
+def conformance(project, *words):
+    return godot(project, *words, "--script", "conformance/spheres.gd")
+
+
+@real
+@pytest.mark.slow
+def test_scripts_agree_without_a_display(project):
+    code, said = conformance(project, "--headless")
+    assert code == 0 and said.count("PASS ") == 4 and "FAIL" not in said and not complaints(said), said
+
+
+@real
+@pytest.mark.slow
+@pytest.mark.parametrize("options", [("--rendering-driver", "vulkan"), ("--rendering-driver", "opengl3")],
+                         ids=["forward+", "compatibility"])
+def test_shaders_agree(project, options):
+    code, said = conformance(project, *options)
+    drawing(said)
+    assert code == 0 and said.count("PASS ") == 8 and "FAIL" not in said and not complaints(said), said
+    code, said = godot(project, *options, "--quit-after", 4)
+    assert code == 0 and not complaints(said), said
+
+
+@real
+@pytest.mark.slow
+@pytest.mark.parametrize(("old", "new", "failing"), [
+    ("alpha * reach / max(away, 1e-12)", "alpha", "kit, sphere probes, shader"),
+    ("left -= share", "left -= 0.0", "kit, sphere probes, shader"),
+    ("mat3(rtgi_spheres_local_from_world) * direction_world", "direction_world", "kit, sphere probes, shader, moved")],
+    ids=["width", "weights", "turned"])
+def test_damage_is_found(project, old, new, failing):
+    for folder in ("rtgi", "conformance/kit"):
+        path = project / folder / "irradiance.gdshaderinc"
+        text = path.read_text()
+        path.write_text(replacing(old, new)(text))
+    try:
+        code, said = conformance(project, "--rendering-driver", "opengl3")
+        drawing(said)
+        assert code == 1 and f"FAIL {failing}" in said, said
+    finally:
+        for folder in ("rtgi", "conformance/kit"):
+            path = project / folder / "irradiance.gdshaderinc"
+            path.write_text(replacing(new, old)(path.read_text()) if new in path.read_text() else path.read_text())
