@@ -151,6 +151,11 @@ def split_at(words: list[str], separator: str) -> tuple[list[str], list[str]]:
     return words[:at], words[at + 1:]
 
 
+def exit_code(returned: int) -> int:
+    """What a shell says of a process that ``subprocess`` says ``returned``: 128 and the number of the signal that ended it."""
+    return 128 - returned if returned < 0 else returned
+
+
 def main() -> None:
     """Read the command line and do what it says."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -178,7 +183,8 @@ def main() -> None:
         sys.exit(f"{tree} is no Debian tree: make it with `{Path(sys.argv[0]).name} create {tree}`")
     binds = (REPOSITORY, *(path.resolve() for path in arguments.bind))
     environment = dict(item.split("=", 1) for item in arguments.env)
-    sys.exit(subprocess.run(command_in(tree, line, binds, environment, not arguments.no_network), check=False).returncode)
+    code = subprocess.run(command_in(tree, line, binds, environment, not arguments.no_network), check=False).returncode
+    sys.exit(exit_code(code))
 
 
 if __name__ == "__main__":

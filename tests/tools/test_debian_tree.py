@@ -1,5 +1,6 @@
 """The Debian tree's tool: which mirror it reads, and what a command in the tree sees."""
 
+import subprocess
 import sys
 from pathlib import Path
 
@@ -46,3 +47,9 @@ def test_a_command_sees_its_folders_and_nothing_of_it_stays_mounted(tool, tmp_pa
 def test_the_command_begins_after_the_first_dashes(tool):
     assert tool.split_at(["run", "tree", "--", "blender", "--", "x"], "--") == (["run", "tree"], ["blender", "--", "x"])
     assert tool.split_at(["create", "tree"], "--") == (["create", "tree"], [])
+
+
+def test_a_command_that_a_signal_ends_has_the_exit_code_of_shells(tool):
+    killed = subprocess.run(["sh", "-c", "kill -SEGV $$"], check=False).returncode
+    assert killed == -11 and tool.exit_code(killed) == 139
+    assert tool.exit_code(5) == 5
