@@ -19,6 +19,8 @@ from .memory import estimate_bytes, shortage
 from .scene import Scene
 from .sphere_probe import MOST_SPHERES
 
+# What counts as no more than white: a layer's share and what it leaves of the base are rounded apart, and may add up to 1 + 1e-7.
+WHITE = 1.0 + 1e-4
 # Heights below this share of the longest edge are float32 rounding, not a triangle.
 DEGENERATE = 1e-7
 # Ratio of the smallest to the largest axis below which a matrix flattens what it moves.
@@ -201,7 +203,7 @@ def _check_materials(scene: Scene):
             yield Finding("error", where, f"has NaN or infinity in its {which}", "mend the value, or the image it comes from")
             continue
         # White texels are everyday; only a value above white is trouble there, while a uniform 1 never stops bouncing.
-        if albedo[1] > 1 or (albedo[1] >= 1 and material.albedo.is_constant):
+        if albedo[1] > WHITE or (albedo[1] >= 1 and material.albedo.is_constant):
             yield Finding("warning", where, f"reflects {albedo[1]:.4g} of the light that meets it",
                           "albedo is cut just below 1, or light would never die out: use 0.8 or less for white paint")
         if albedo[0] < 0:

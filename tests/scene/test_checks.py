@@ -108,6 +108,10 @@ def test_white_texels_are_everyday_but_brighter_ones_are_not():
     assert check_scene(with_material(closed_box(), albedo=Channel(texture=byte))) == []
     bright = Texture("bright", np.full((2, 2, 3), 1.5, np.float32))
     assert "reflects 1.5" in found(with_material(closed_box(), albedo=Channel(texture=bright)))[1]
+    # What Principled makes of a texture: its layer's share is added to what that leaves of the base, and both are rounded.
+    share = np.float32(0.0599)
+    layered = Channel(constant=np.full(3, np.float32(1.0) - share + np.float32(6e-8)), texture=byte, offset=np.full(3, share))
+    assert check_scene(with_material(closed_box(), albedo=layered)) == []
 
 
 def test_material_values_that_are_no_light():
