@@ -198,6 +198,14 @@ INDIRECT_ATLAS = Program(
               "atlas_triangles"),
     images=(Image("irradiance"),), local_size=_GROUP)
 
+# What a lattice of pixels sees, without its mirrors.
+POINT_TARGETS = ("position", "normal", "albedo", "emission", "geometry")
+CAMERA_POINTS = Program(
+    "camera_points", uniforms=(("points", UniformStruct("CameraPointsFrame", (
+        ("ivec2", "corner"), ("ivec2", "extent"), ("ivec2", "count"), ("ivec2", "shift")))),),
+    samplers=tuple(f"gbuffer_{name}" for name in POINT_TARGETS), images=tuple(Image(f"point_{name}") for name in POINT_TARGETS),
+    local_size=_GROUP)
+
 INDIRECT_FRAME = UniformStruct("IndirectFrame", (("ivec2", "size"),))
 
 

@@ -18,6 +18,7 @@ from ..transport.context import changed_surfaces, same_values
 from ..transport.views.camera import CameraView
 from ..transport.views.drawn_instances import seen_by_cameras
 from ..transport.views.pixel_filter import sample_offset
+from .camera_points import PointLight, lattice, read_points
 from .capture import Drawn
 from .direct_light import DirectLight
 from .effects import make_halves
@@ -221,11 +222,25 @@ class PreviewRenderer:
             # What the bake holds of lamps would be lit twice.
             added = lamps_to_add(self.scene.lights, self._indirect.direct_lamps)
             self._lamps.draw(self.scene, added, self._surfaces, self._bounds, view, index, inputs, self._direct)
+        self._put_in(view, index)
         draw_indirect(self._indirect, inputs, self._irradiance)
         self._atlas_light.draw(self._atlas, self.scene, self._gbuffer.textures, self._irradiance)
         self._film.add(view, offset, inputs, self._background, self.settings.film_transparent,
                        partial(self._with_effects, offset) if self._halves else None)
         self._before = Before(self.scene, view, tuple(offset))
+
+    def _put_in(self, view: CameraView, index: int) -> None:
+        """Give light that takes in what a camera sees the points of what has moved (``moved``: techniques.voxels.moved.Moved)."""
+        moved = getattr(self._indirect, "moved", None)
+        if moved is None or not self.settings.camera_points:
+            return
+        seen = np.flatnonzero(moved.unknown & self._shown)
+        boxes = [box for box in (instance_corners(self.scene, index) for index in seen) if box is not None]
+        of = lattice(view, np.array(boxes), self.size, self.settings.camera_points, index) if boxes else None
+        points = None
+        if of is not None:
+            points = read_points(of, view, self.size, index, self.gbuffer, PointLight(self._lamps, self._drawn, self._indirect))
+        self._indirect.put_in(points)
 
     def _with_effects(self, offset, light: gpu.types.GPUTexture) -> Made:
         """What all effects make of the lit picture ``light``."""
@@ -251,10 +266,21 @@ def scene_bounds(scene: Scene) -> np.ndarray:
     corners = [np.zeros((1, 3))]
     for instance in scene.instances:
         if boxes[instance.mesh] is not None:
-            matrix = np.asarray(instance.world_from_local, np.float64)
-            corners.append(boxes[instance.mesh] @ matrix[:3, :3].T + matrix[:3, 3])
+            corners.append(_placed(boxes[instance.mesh], instance))
     points = np.concatenate(corners[1:] or corners)
     return np.array([points.min(axis=0), points.max(axis=0)])
+
+
+def instance_corners(scene: Scene, index: int) -> np.ndarray | None:
+    """World corners (8, 3) of the box around an instance, None if it has no vertices."""
+    instance = scene.instances[index]
+    box = _box(scene.meshes[instance.mesh])
+    return None if box is None else _placed(box, instance)
+
+
+def _placed(corners: np.ndarray, instance: Instance) -> np.ndarray:
+    matrix = np.asarray(instance.world_from_local, np.float64)
+    return corners @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 def _box(mesh: Mesh) -> np.ndarray | None:

@@ -20,6 +20,8 @@ class PreviewSettings:
     shadow_cascades: int = setting(3, "Sun Cascades", "Shadow maps a sun has, for near to far parts of the view", "", 1, 6)
     shadow_views: int = setting(64, "Shadow Views", "Shadow maps drawn a frame; where lamps need more, every frame has its "
                                 "share of them", "", 8, 4096)
+    camera_points: int = setting(4096, "Moving Points", "Points of what has moved that every frame puts into voxels, of what the "
+                                 "camera sees, until they are made anew; 0 for none", "", 0, 65536)
     film_transparent: bool = setting(False, "Transparent", "Leave the world out of the picture; it still lights the scene")
 
 

@@ -48,6 +48,8 @@ class RTGI_PT_preview(OfOurEngine, bpy.types.Panel):
             column.prop(preview, "gather_samples")
         layout.prop(preview, "mode")
         layout.prop(preview, "resolution_scale")
+        if issubclass(get(scene.rtgi.technique).Settings, VoxelSettings):
+            layout.prop(preview, "camera_points")
         shown = shown_for(scene)
         if shown.note:
             draw_lines(layout, sentence(shown.note), context.region.width, "INFO")

@@ -1,4 +1,7 @@
-"""Lit voxels in the preview: a worker puts the scene into voxels and lights them, of what is drawn, whatever of it has changed."""
+"""Lit voxels in the preview: a worker puts the scene into voxels and lights them, of what is drawn, whatever of it has changed.
+
+Until it has, what moved is taken out of the voxels where it was, and what the camera sees of it is put in (``put_in``).
+"""
 
 from dataclasses import replace
 from functools import partial
@@ -12,13 +15,15 @@ from ...techniques import get
 from ...techniques.cone_tracing import ConeSettings
 from ...techniques.voxel_march import CELLS
 from ...techniques.voxels.field import VoxelField
+from ...techniques.voxels.moved import FollowedVoxels, Moved, moved_since
 from ...techniques.voxels.settings import VoxelSettings
 from ...transport.context import changed_surfaces, same_values
 from ...transport.parallel import thread_count
+from ...transport.voxels.moving import CameraPoints
 from .probes import grid_tables
 from .relighting import RelitLight
 from .tables import Tables
-from .voxels import voxel_tables
+from .voxels import LitVoxels, tables_of, voxel_tables
 
 _SEED = 0
 
@@ -36,6 +41,7 @@ class LiveVoxelsLight(RelitLight):
 
     def __init__(self, settings: VoxelSettings, field: VoxelField | None, scene: Scene, samples: int | None = None):
         self.field, self._settings, self._newest = field, settings, field
+        self._samples, self._drawn, self._moved, self._followed = samples, scene, None, None
         super().__init__(field, partial(tables_of_field, samples=samples), self._made, holds_direct=False)
         if field is None:
             self.follow(scene)
@@ -45,10 +51,38 @@ class LiveVoxelsLight(RelitLight):
         """What of the scene is not as it should be for what is shown: walls that are thinner than a voxel."""
         return () if self.field is None else tuple(self.field.notes)
 
+    @property
+    def moved(self) -> Moved | None:
+        """What of the scene that is drawn the voxels do not know and a camera can put in, None for nothing."""
+        return self._moved
+
+    def put_in(self, points: CameraPoints | None) -> None:
+        """Show the voxels without what moved, and with what of it is among ``points`` that a camera sees (None: nothing is)."""
+        field = self.field
+        if self._followed is None:
+            self._followed = FollowedVoxels(field, self._moved)
+        hierarchy = self._followed.with_points(points)
+        self.set(tables_of(LitVoxels(field.context, field.settings, field.seed, hierarchy), self._samples))
+
+    def follow(self, scene: Scene) -> bool:
+        """See FieldLight."""
+        self._drawn = scene
+        self._compare()
+        return super().follow(scene)
+
     def take(self, field: VoxelField, tables: Tables) -> None:
         """See RelitLight."""
         super().take(field, tables)
         self.field = field
+        # The worker may be behind what is drawn.
+        self._compare()
+
+    def _compare(self) -> None:
+        self._moved = self._followed = None
+        # What arrives in cells is shown through probes, which know no surfaces.
+        if self.field is not None and getattr(self._settings, "gather", None) != CELLS:
+            moved = moved_since(self.field.context.scene, self._drawn)
+            self._moved = moved if moved.any else None
 
     def _made(self, scene: Scene, progress: Progress) -> VoxelField:
         """The field of ``scene``; the newest one's voxels stay as long as they hold the same surfaces. On the worker."""

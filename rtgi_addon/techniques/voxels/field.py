@@ -16,7 +16,7 @@ from ...transport.context import LightContext
 from ...transport.parallel import chunks, parallel_for
 from ...transport.paths.sources import Sources
 from ...transport.voxels import Voxels, voxelize
-from ...transport.voxels.hierarchy import Hierarchy
+from ...transport.voxels.hierarchy import Hierarchy, build_hierarchy
 from ...transport.voxels.rays import box_span
 from ..base import Field, ProbeGrid, all_captured
 from ..kernels import Kernels
@@ -51,7 +51,9 @@ class VoxelField(Field):
         self._bright = [context.lamps.count] if context.environment.bright.count else []
         self._lamp_light = LampLight(context, False, LAMP_SAMPLES, seed)
         self.direct_lamps = self._lamp_light.names
-        self.hierarchy: Hierarchy = VoxelLight(context, voxels, settings, seed).hierarchy(self._sky, progress)
+        # By point of ``voxels.seen``, so that voxels can be lit anew without some of what is in them.
+        self.leaving = VoxelLight(context, voxels, settings, seed).leaving(self._sky, progress)
+        self.hierarchy: Hierarchy = build_hierarchy(voxels, voxels.by_face(self.leaving))
         self.stats = {"rays": 0, "voxels": len(voxels.cells), "voxel_size": voxels.grid.cell,
                       "grid": list(voxels.grid.resolution)}
         self.notes = tuple(thin_walls(context, voxels))

@@ -23,7 +23,7 @@ from ...transport.vectors import dot
 from ...transport.views.reflective_shadow_map import capture
 from ...transport.voxels import Voxels
 from ...transport.voxels.grid import FACES
-from ...transport.voxels.hierarchy import Hierarchy, build_hierarchy
+from ...transport.voxels.hierarchy import build_hierarchy
 from ...transport.voxels.injection import inject
 from ...transport.voxels.sweeps import sweep
 from ..lpv.sources import map_views
@@ -50,16 +50,16 @@ class VoxelLight:
         # Sources that shadow rays are sent to: where maps know lamps, what follows them is bright sky.
         self._first = context.lamps.count if settings.light == MAPS else 0
 
-    def hierarchy(self, beyond, progress: Progress) -> Hierarchy:
-        """The lit voxels; ``beyond``(directions (k, 3)) is the radiance (k, 3) of what lies outside them. Raises Cancelled,
-        BakeError."""
+    def leaving(self, beyond, progress: Progress) -> np.ndarray:
+        """Radiance (e, 3) float32 that leaves what the voxels' faces show, by point of ``Voxels.seen``; ``beyond``(directions (k,
+        3)) is that (k, 3) of what lies outside them. Raises Cancelled, BakeError."""
         direct = self._by_chunks(self._direct, progress.span(0.0, _LAMPS), "lamps on voxels")
         if self._settings.light == MAPS:
             direct += self._mapped(progress)
         rest = progress.span(_LAMPS, 1.0)
         if self._settings.light == SURFACES:
-            return build_hierarchy(self._voxels, self._voxels.by_face(direct + self._cached(rest)))
-        return build_hierarchy(self._voxels, self._voxels.by_face(self._bounced(direct, beyond, rest)))
+            return direct + self._cached(rest)
+        return self._bounced(direct, beyond, rest)
 
     def _bounced(self, direct: np.ndarray, beyond, progress: Progress) -> np.ndarray:
         """What leaves of ``direct`` (e, 3), of what lies beyond, and of what voxels then send each other."""

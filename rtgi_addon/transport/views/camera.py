@@ -93,6 +93,26 @@ class CameraView:
         w = clip[:, 3]
         return clip[:, :2] / np.where(np.abs(w) > 1e-12, w, 1e-12)[:, None] * 0.5 + 0.5, w
 
+    def footprint(self, points: np.ndarray, normals: np.ndarray, least: float) -> np.ndarray:
+        """Area (n,) float64 [m²] that the whole picture would see of planes through world ``points`` (n, 3) under unit ``normals``
+        (n, 3), if all of it saw them as it does there: a pixel's share of the picture times this is what the pixel stands for.
+        Cosines to the ray count for ``least`` at least: a pixel that grazes a surface would stand for more than it sees."""
+        near, towards, _ = self.through(np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0]))
+        plane = np.cross(near[1] - near[0], near[2] - near[0])
+        area = float(np.linalg.norm(plane))
+        plane /= max(area, np.finfo(np.float64).tiny)
+        if self.orthographic:
+            along = np.broadcast_to(towards[0], np.shape(points))
+            return area / np.maximum(np.abs((along * normals).sum(axis=1)), least)
+        # A plane that is parallel to the picture's is seen larger by the square of its depth, and a slanted one by the cosines of
+        # the ray to both.
+        eye = self.position
+        way = np.asarray(points, np.float64) - eye
+        distance = np.maximum(np.linalg.norm(way, axis=1), np.finfo(np.float64).tiny)
+        depth, front = np.abs(way @ plane), abs(float((near[0] - eye) @ plane))
+        slant = np.maximum(np.abs((way * normals).sum(axis=1)) / distance, least)
+        return area * (depth / max(front, np.finfo(np.float64).tiny)) ** 2 * (depth / distance) / slant
+
     @property
     def position(self) -> np.ndarray:
         """(3,) float64 where the eye is [m]; of a parallel projection, a point on its middle ray."""

@@ -357,6 +357,9 @@ INTERFACE: dict[str, str] = {
     "Shadow Views": "Schattenansichten",
     "Shadow maps drawn a frame; where lamps need more, every frame has its share of them":
         "Schattenkarten, die je Bild gezeichnet werden; brauchen die Lampen mehr, bekommt jedes Bild seinen Teil davon",
+    "Moving Points": "Bewegte Punkte",
+    "Points of what has moved that every frame puts into voxels, of what the camera sees, until they are made anew; 0 for none":
+        "Punkte von Bewegtem, das die Kamera sieht und jedes Bild in die Voxel einträgt, bis diese neu entstehen; 0 für keine",
     "Leave the world out of the picture; it still lights the scene":
         "Die Welt nicht im Bild zeigen; die Szene beleuchtet sie trotzdem",
     "Spheres where the probes are: in the light that they hold, those of sphere probes as mirrors, or coloured by whether they are "
