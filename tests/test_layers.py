@@ -4,6 +4,7 @@ public is documented."""
 import ast
 import re
 import sys
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -254,3 +255,31 @@ def test_the_public_is_documented():
             bare.append(f"{name}: the module itself")
         bare += [f"{name}:{line} {what}" for what, line in undocumented(tree)]
     assert not bare, "without a docstring:\n" + "\n".join(bare)
+
+
+def leftovers(sources, others=()):
+    """What is made and never looked at in ``sources`` (name to text): modules' constants that no text names again, ``others``
+    included, and attributes ``self._name`` that are given a value and that no text reads."""
+    named = Counter(word for source in (*sources.values(), *others) for word in re.findall(r"[A-Za-z_]\w*", source))
+    for where, source in sources.items():
+        tree = ast.parse(source)
+        made = [(name.lineno, name.id, 1) for node in tree.body if isinstance(node, ast.Assign) for target in node.targets
+                for name in ast.walk(target) if isinstance(name, ast.Name) and name.id[:2] != "__"]
+        attributes = [node for node in ast.walk(tree) if isinstance(node, ast.Attribute)]
+        read = {node.attr for node in attributes if isinstance(node.ctx, ast.Load)}
+        given = [node for node in attributes if node.attr.startswith("_") and node.attr not in read and
+                 isinstance(node.value, ast.Name) and node.value.id == "self"]
+        made += [(node.lineno, node.attr, sum(node.attr == other.attr for other in given)) for node in given]
+        yield from (f"{where}:{line} {name}" for line, name, times in made if named[name] == times)
+
+
+def test_nothing_is_made_that_nobody_looks_at():
+    package = {path.relative_to(ROOT).as_posix(): path.read_text() for path in modules()}
+    # Whoever adds an engine or a reader finds it there: what tests hold is for others to use.
+    tests = [path.read_text() for path in (ROOT / "tests").rglob("*.py")]
+    assert list(leftovers(package, tests)) == []
+
+
+def test_leftovers_are_found():
+    source = "OLD, USED = 1, 2\nclass A:\n    def f(self):\n        self._old, self._new = USED, self\n        return self._new\n"
+    assert list(leftovers({"a.py": source})) == ["a.py:1 OLD", "a.py:4 _old"]

@@ -112,27 +112,6 @@ def leak_ratio(estimate, dark, lit) -> float:
     return leaked / bright
 
 
-def error_per_probe(estimate, reference, variance=None) -> np.ndarray:
-    """RMS error (n,) of each probe over its coefficients and channels, in their unit, less the reference's own variance."""
-    squared, _ = _relative_sums(estimate, reference, variance)
-    return np.sqrt(np.maximum(squared, 0.0) / max(1, np.asarray(estimate)[0].size))
-
-
-def z_scores(estimate, reference, variance) -> np.ndarray:
-    """(x − r)/√variance, of the arrays' shape: standard normal where the two agree; without variance 0 or infinite."""
-    x, r = _pair(estimate, reference)
-    difference, deviation = x - r, np.sqrt(np.broadcast_to(np.asarray(variance, np.float64), x.shape))
-    unequal = np.where(difference == 0, 0.0, np.copysign(np.inf, difference))
-    return np.where(deviation > 0, difference / np.where(deviation > 0, deviation, 1.0), unequal)
-
-
-def temporal_flicker(frames) -> float:
-    """Mean over points of the standard deviation over time, relative to the mean: ``frames`` (t, n, …) of one quantity."""
-    values = np.asarray(frames, np.float64)
-    mean = float(values.mean())
-    return float(values.std(axis=0).mean()) / mean if mean else 0.0
-
-
 def _relative_sums(estimate, reference, variance) -> tuple[np.ndarray, np.ndarray]:
     """Per probe: Σ(x − r)² − Σ variance, and Σr²."""
     x, r = _pair(estimate, reference)

@@ -39,11 +39,6 @@ def interval_of_another_draw(off: np.ndarray, power: np.ndarray, confidence: flo
     return float(value * min(low / value, 1.0) ** np.sqrt(2.0)), float(value * (high / value) ** np.sqrt(2.0))
 
 
-def upper_quantile(off: np.ndarray, power: np.ndarray, confidence: float) -> float:
-    """What the value at these points may be with ``confidence`` (one-sided) if the tail goes on as it is thought to."""
-    return max(float(np.quantile(draws, confidence)) for draws in (_plain(off, power), _tailed(off, power)))
-
-
 def _rows(count: int) -> np.ndarray:
     return hash_u32(_PURPOSE, np.arange(DRAWS)[:, None], np.arange(count)) % np.uint32(count)
 

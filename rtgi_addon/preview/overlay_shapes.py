@@ -48,10 +48,10 @@ def probe_rows(grids: Sequence[ProbeGrid], size: float = 1.0) -> tuple[np.ndarra
     times as large as usual; and the SH order of their coefficients, which are those of irradiance as it was baked."""
     order = max(grid.order for grid in grids)
     blocks = -(-sh.coefficient_count(order) // 4)
-    return np.concatenate([_rows_of(grid, order, blocks, size) for grid in grids]), order
+    return np.concatenate([_rows_of(grid, blocks, size) for grid in grids]), order
 
 
-def _rows_of(grid: ProbeGrid, order: int, blocks: int, size: float) -> np.ndarray:
+def _rows_of(grid: ProbeGrid, blocks: int, size: float) -> np.ndarray:
     held = grid.sh.reshape(-1, *grid.sh.shape[3:])
     points = lattice.lattice_points(grid.volume.world_from_local, grid.volume.resolution) + grid.offset_world
     side = lattice.cell_size(grid.volume.world_from_local, grid.volume.nodes).min()

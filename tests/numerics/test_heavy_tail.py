@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rtgi_addon.numerics.heavy_tail import interval_of_another_draw, root_ratio, upper_quantile
+from rtgi_addon.numerics.heavy_tail import interval_of_another_draw, root_ratio
 
 
 @pytest.mark.parametrize(("name", "least"), [("exponential", 0.9), ("lognormal", 0.85), ("pareto", 0.75)])
@@ -25,8 +25,7 @@ def test_the_interval_covers_another_draw(name, least):
     assert covered >= least * tries and covered > bootstrapped
 
 
-def test_a_bound_lies_above_what_was_seen_and_nothing_is_invented():
+def test_nothing_is_invented():
     off, power = np.random.default_rng(1).pareto(1.5, 200), np.ones(200)
-    assert upper_quantile(off, power, 0.9) > root_ratio(off, power)
     assert interval_of_another_draw(np.zeros(50), np.ones(50), 0.95) == (0.0, 0.0)
     assert root_ratio(-off, power) == 0.0 and root_ratio(off, np.zeros(200)) == 0.0

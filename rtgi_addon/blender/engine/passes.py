@@ -6,9 +6,6 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-# What Blender's engines write as the depth of nothing.
-FAR_AWAY = 1e10
-
 
 @dataclass(frozen=True)
 class RenderPass:

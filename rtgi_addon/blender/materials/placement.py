@@ -27,7 +27,6 @@ class Placements:
     def __init__(self, scene, depsgraph):
         self._scene, self._layer = scene, depsgraph.view_layer_eval
         self._evaluated_scene = depsgraph.scene_eval
-        self._depsgraph = depsgraph
         self._instancers: dict[tuple, tuple | None] = {}
 
     def answers(self, asked: frozenset, item) -> tuple:

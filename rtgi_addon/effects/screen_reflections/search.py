@@ -77,7 +77,7 @@ def search(screen: Screen, rays: ScreenRays, directions: np.ndarray, thickness: 
         passes = deepest < least
         # Where something may be met the search goes down, and at a pixel it is looked at.
         met = np.flatnonzero(~passes & (lift == 0))
-        hit = met[_meets(screen, ray.take(met), directions[rows[met]], here[met], start[rows[met]], np.minimum(*depths)[met],
+        hit = met[_meets(screen, directions[rows[met]], here[met], start[rows[met]], np.minimum(*depths)[met],
                          least[met], thickness)]
         chosen = rows[hit]
         place = np.clip(ray.take(hit).at_depth(least[hit]), s[chosen], leave[hit])
@@ -114,7 +114,7 @@ def _of_levels(levels: list[np.ndarray], level: np.ndarray, cell: np.ndarray) ->
     return result
 
 
-def _meets(screen: Screen, rays: ScreenRays, directions, pixel, start, nearest, depth, thickness) -> np.ndarray:
+def _meets(screen: Screen, directions, pixel, start, nearest, depth, thickness) -> np.ndarray:
     """Which rays (m,) bool meet the surface of their pixel, whose ``depth`` (m,) they reach."""
     apart = np.abs(pixel - start).max(axis=1) >= MOVED
     front = facing(screen.normals[pixel[:, 1], pixel[:, 0]], directions)

@@ -8,10 +8,6 @@ from ...numerics import dome
 from ...scene import World
 from ..base import ProbeGrid
 
-# The matrices of a probe by the names of their files, and whether they are colours; LIGHTS are always stored in whole floats.
-SKY, BOUNCE, SUNS, SEEN, LIGHTS, LOCAL = "sky", "bounce", "suns", "seen", "lights", "local"
-COLOURED = (BOUNCE, SUNS, LIGHTS, LOCAL)
-
 
 @dataclass(frozen=True, eq=False)
 class TransferGrid:

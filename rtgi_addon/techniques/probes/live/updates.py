@@ -66,7 +66,7 @@ class LiveProbes:
         if not scene.volumes:
             raise BakeError("the scene has no probe volume", "add a Light Probe Volume")
         self.scene, self._pending = scene, None
-        self._tracers, self._paid = MovingTracers(), 0
+        self._tracers = MovingTracers()
         self._context = LightContext(scene, self._threads, make=self._tracers)
         self._owed = 0
         self._field = None
