@@ -1,7 +1,8 @@
 """How much light what was not followed concerns: an estimate by paths from the probes.
 
 Rays from usable probes to all sides carry what the path tracer says arrives along them. A surface concerns what comes straight
-from it, reflected or emitted; a lamp what it would send to the probes by way of the surfaces that they see; something without a
+from it, reflected or emitted, or what would if it were as bright as all else, where nothing does: black is what a shader is taken
+for that cannot be read. A lamp concerns what it would send to the probes by way of the surfaces that they see; something without a
 surface (hair, a volume) what passes through its box. So the share of fog around the probes is 1 whatever its density, and light
 that is changed further away than the first surface is not counted: the share says where to look first, not how wrong the bake
 is. `rtgi verify` measures that.
@@ -95,14 +96,17 @@ class _Seen:
             known = True
             hit = self.hits.primitive >= 0
             concerned[hit] |= triangles[self.hits.primitive[hit]]
-        lit = float(self.arriving[concerned].sum(dtype=np.float64))
+        lit, total = float(self.arriving[concerned].sum(dtype=np.float64)), self.total
+        if triangles.any() and concerned.any() and not concerned.all() and not lit:
+            lit = float(self.arriving[~concerned].mean(dtype=np.float64)) * np.count_nonzero(concerned)
+            total += lit
         others = tuple(light for light in scene.lights if light.name not in omission.objects)
         if len(others) < len(scene.lights):
             known = True
             without = self.context.relit(replace(scene, lights=others))
             rest = luminance(trace_radiance(without, self.origins, self.directions, seed=self.seed))
             lit += float((self.arriving - rest)[~concerned].sum(dtype=np.float64))
-        return min(max(lit / self.total, 0.0), 1.0) if known else None
+        return min(max(lit / total, 0.0), 1.0) if known else None
 
 
 def usable_probes(field: Field) -> np.ndarray:

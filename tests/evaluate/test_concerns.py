@@ -36,6 +36,11 @@ def test_a_surface_concerns_what_comes_from_it(halves):
     assert share(halves, objects=("upper",), materials=("dim",)) == pytest.approx(1.0)
 
 
+def test_what_was_taken_for_black_concerns_as_much_as_if_it_were_as_bright_as_the_rest(halves):
+    unread = replace(halves, materials=(halves.materials[0], build.material("bright", 0.0, 0.0)))
+    assert share(unread, materials=("bright",)) == pytest.approx(1 / 6, rel=0.03)
+
+
 def test_what_has_no_surface_concerns_what_passes_through_it(halves):
     behind = np.array([[[-9, -9, 2], [9, 9, 3]]], float)
     around = np.array([[[-0.1, -0.1, -0.1], [0.1, 0.1, 0.1]]])

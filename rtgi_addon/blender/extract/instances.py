@@ -1,6 +1,7 @@
 """Every placement of geometry: what is read, once per mesh, and with which materials."""
 
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
@@ -73,8 +74,9 @@ class GeometryCollector:
             self._omit(item, "is invisible to diffuse rays, but probes see it: they look as a camera does")
         key = obj.data.as_pointer()
         slots = self._slots(item, key)
-        if _has_hair(obj):
-            self._omit(item, "has particle hair: it has no surface to bake and is left out")
+        hair = _hair_length(obj)
+        if hair is not None:
+            self._omit(item, "has particle hair: it has no surface to bake and is left out", hair)
         geometry = self._geometries.get((key, slots))
         if geometry is None:
             if key in self._bases and self._bases[key] is None:
@@ -211,19 +213,23 @@ class GeometryCollector:
                 self._materials.append(read)
         return self._material_index[key]
 
-    def _omit(self, item, what: str) -> None:
-        """Say what is not followed of one placement of an object."""
-        self._omissions.add(f"{item.object.name} {what}", objects=[item.object.name], box_world=_world_box(item))
+    def _omit(self, item, what: str, around: float = 0.0) -> None:
+        """Say what is not followed of one placement of an object, which reaches so far ``around`` it in its own space."""
+        self._omissions.add(f"{item.object.name} {what}", objects=[item.object.name], box_world=_world_box(item, around))
 
 
-def _has_hair(obj) -> bool:
-    return any(system.settings.type == "HAIR" and system.settings.render_type == "PATH" for system in obj.particle_systems)
+def _hair_length(obj) -> float | None:
+    """The length of an object's longest strands that are drawn as such, in its own space; None without any."""
+    return max((system.settings.hair_length for system in obj.particle_systems
+                if system.settings.type == "HAIR" and system.settings.render_type == "PATH"), default=None)
 
 
-def _world_box(item) -> np.ndarray:
-    """Lowest and highest corner (2, 3) of a ``DepsgraphObjectInstance``'s bounds in the world."""
-    matrix = np.array(item.matrix_world, np.float64)
-    corners = np.array(item.object.bound_box, np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+def _world_box(item, around: float = 0.0) -> np.ndarray:
+    """Lowest and highest corner (2, 3) in the world of a ``DepsgraphObjectInstance``'s bounds, wider by ``around`` on each side in
+    its own space."""
+    matrix, local = np.array(item.matrix_world, np.float64), np.array(item.object.bound_box, np.float64)
+    sides = zip(local.min(axis=0) - around, local.max(axis=0) + around, strict=True)
+    corners = np.array(list(product(*sides))) @ matrix[:3, :3].T + matrix[:3, 3]
     return np.stack([corners.min(axis=0), corners.max(axis=0)])
 
 

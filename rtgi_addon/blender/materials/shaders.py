@@ -122,6 +122,8 @@ class ShaderReader:
 
         wall = self._number(node, "Thin Wall", path) > 0.5
         through = self._through(node, path) if wall else 0.0
+        if not wall and self._number(node, "Subsurface Weight", path) > 0.0:
+            self._spread(node, "Subsurface ", path)
         reflected = base * ((1.0 - through) * (1.0 - specular)) + Value.of(specular)
         translucency = base * (through * (1.0 - specular))
         covered, tint = _WHITE, _WHITE
@@ -193,6 +195,16 @@ class ShaderReader:
         if node.bl_idname == "ShaderNodeBsdfDiffuse":
             self._shape_of_reflection(node, self._number(node, "Roughness", path))
         return Surface(color, base_color=color)
+
+    def _subsurface(self, node, path: tuple) -> Surface:
+        self._spread(node, "", path)
+        return self._diffuse(node, path)
+
+    def _spread(self, node, prefix: str, path: tuple) -> None:
+        """Say how far light goes beneath the surface in Cycles. Its colour is what leaves one that is flat and thick."""
+        reach = float(self._mean_color(node, prefix + "Radius", path).max()) * self._number(node, prefix + "Scale", path, 1.0)
+        if reach > 0.0:
+            self._remark(f"the light that goes some {reach:.2g} m beneath its surface leaves it where it entered")
 
     def _shape_of_reflection(self, node, roughness: float) -> None:
         """Say what bends diffuse reflection in Cycles and not here; the reflected flux is right all the same."""
@@ -337,7 +349,7 @@ def ratio(value: Value, alpha: Value) -> Value:
 _READERS = {
     "ShaderNodeBsdfPrincipled": ShaderReader._principled,
     "ShaderNodeBsdfDiffuse": ShaderReader._diffuse,
-    "ShaderNodeSubsurfaceScattering": ShaderReader._diffuse,
+    "ShaderNodeSubsurfaceScattering": ShaderReader._subsurface,
     "ShaderNodeBsdfTranslucent": ShaderReader._translucent,
     "ShaderNodeBsdfAnisotropic": ShaderReader._glossy,
     "ShaderNodeBsdfMetallic": ShaderReader._metallic,

@@ -263,6 +263,18 @@ def test_ray_visibility_is_read_and_what_has_no_surface_is_said_by_object(empty_
     np.testing.assert_allclose(found["ghost",].boxes_world, [[[-1, -1, -1], [1, 1, 1]]])
 
 
+def test_particle_hair_is_where_its_strands_are(empty_blend):
+    ground = bpy.data.meshes.new("ground")
+    ground.from_pydata([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], [], [(0, 1, 2, 3)])
+    meadow = link("meadow", ground, Matrix.Diagonal((1, 1, 2, 1)))
+    meadow.modifiers.new("grass", "PARTICLE_SYSTEM")
+    settings = meadow.particle_systems[0].settings
+    settings.type, settings.count, settings.hair_length = "HAIR", 3, 0.5
+    omission, = extract_scene().omissions
+    assert str(omission) == "meadow has particle hair: it has no surface to bake and is left out"
+    np.testing.assert_allclose(omission.boxes_world, [[[-1.5, -1.5, -1], [1.5, 1.5, 1]]])
+
+
 def test_linked_and_overridden_objects(empty_blend, tmp_path):
     library = tmp_path / "library.blend"
     collection = bpy.data.collections.new("props")

@@ -336,6 +336,21 @@ def test_what_bends_diffuse_reflection_is_said(empty_blend):
     assert not said_of(read_object(grid_object(plain))[2])
 
 
+def test_how_far_light_goes_beneath_a_surface_is_said(empty_blend):
+    material, _node = new_principled(Subsurface_Weight=0.5, Subsurface_Radius=(1.0, 0.2, 0.1), Subsurface_Scale=0.6)
+    other, output = new_material("wax")
+    node = other.node_tree.nodes.new("ShaderNodeSubsurfaceScattering")
+    node.inputs["Radius"].default_value, node.inputs["Scale"].default_value = (0.5, 1.0, 0.2), 0.03
+    other.node_tree.links.new(node.outputs[0], output.inputs["Surface"])
+    assert "some 0.6 m beneath its surface" in said_of(read_object(grid_object(material))[2])
+    assert "some 0.03 m beneath its surface" in said_of(read_object(grid_object(other))[2])
+    # What lies on both sides of a thin wall is followed, and without a weight nothing goes beneath.
+    thin, node = new_principled(Subsurface_Weight=0.5)
+    node.inputs["Thin Wall"].default_value = True
+    none, _node = new_principled(Subsurface_Weight=0.0, Subsurface_Scale=0.6)
+    assert not said_of(read_object(grid_object(thin))[2]) + said_of(read_object(grid_object(none))[2])
+
+
 def test_hair_without_a_formula_is_named(empty_blend):
     """Principled Hair has no diffuse colour to bake: what is black then is said, by the material."""
     material, output = new_material()
