@@ -7,6 +7,8 @@ Arrays over a lattice are indexed [z, y, x]; its flat index is (z·ny + y)·nx +
 
 import numpy as np
 
+# Bits along an axis of a Z-order code of three.
+CURVE_BITS = 21
 # Corners of the box [−1, 1]³ that probe volumes are in their own space.
 UNIT_BOX = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float64)
 
@@ -82,6 +84,20 @@ def trilinear(points_lattice: np.ndarray, resolution) -> tuple[np.ndarray, np.nd
     indices = offsets[:, 0, bits[0]] + offsets[:, 1, bits[1]] + offsets[:, 2, bits[2]]
     weights = shares[:, 0, bits[0]] * shares[:, 1, bits[1]] * shares[:, 2, bits[2]]
     return indices, weights
+
+
+def z_order(cells: np.ndarray) -> np.ndarray:
+    """Codes (n,) uint64 that put ``cells`` (n, d) of a lattice, from 0 to below 2^CURVE_BITS along each of up to three axes, in the
+    order of a Z-order curve: what follows one another lies near one another (G. M. Morton, 1966)."""
+    code = np.zeros(len(cells), np.uint64)
+    for axis in range(cells.shape[1]):
+        # Two zeros between every bit and the next.
+        spread = cells[:, axis].astype(np.uint64)
+        for shift, mask in ((32, 0x1F00000000FFFF), (16, 0x1F0000FF0000FF), (8, 0x100F00F00F00F00F), (4, 0x10C30C30C30C30C3),
+                            (2, 0x1249249249249249)):
+            spread = (spread | (spread << np.uint64(shift))) & np.uint64(mask)
+        code |= spread << np.uint64(axis)
+    return code
 
 
 def box_distance(world_from_local: np.ndarray, points: np.ndarray) -> np.ndarray:

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import BakeError
 from ..machine.memory import available_bytes
+from ..numerics.blocks import blocks, cross, extent
 from ..numerics.grid import UNIT_BOX
 from .lights import AreaLight
 from .material import Channel
@@ -108,7 +109,9 @@ def _check_meshes(scene: Scene):
         if mesh.triangles.min() < 0 or mesh.triangles.max() >= len(mesh.vertices_local):
             yield Finding("error", owner, "has faces that name vertices it lacks", "run Mesh > Clean Up or Validate on it")
             continue
-        broken = int(np.count_nonzero(~np.isfinite(mesh.vertices_local).all(axis=1)))
+        # All of them at once first: reducing over an axis of three costs numpy several times as much.
+        broken = 0 if np.isfinite(mesh.vertices_local).all() else int(
+            np.count_nonzero(~np.isfinite(mesh.vertices_local).all(axis=1)))
         if broken:
             yield Finding("error", owner, f"has {broken} vertices at NaN or infinity",
                           "delete them, or mend the modifier that makes them")
@@ -122,11 +125,14 @@ def _check_meshes(scene: Scene):
 
 
 def _count_degenerate(vertices: np.ndarray, triangles: np.ndarray) -> int:
-    corners = vertices[triangles]
-    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    third = second - first
-    longest = np.maximum(np.maximum(_squared(first), _squared(second)), _squared(third))
-    return int(np.count_nonzero(_squared(np.cross(first, second)) <= np.square(DEGENERATE * longest)))
+    found = 0
+    for rows in blocks(len(triangles)):
+        corners = vertices[triangles[rows]]
+        first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        third = second - first
+        longest = np.maximum(np.maximum(_squared(first), _squared(second)), _squared(third))
+        found += int(np.count_nonzero(_squared(cross(first, second)) <= np.square(DEGENERATE * longest)))
+    return found
 
 
 def _squared(vectors: np.ndarray) -> np.ndarray:
@@ -164,7 +170,7 @@ def instance_corners(scene: Scene) -> np.ndarray:
     for index in {instance.mesh for instance in scene.instances}:
         vertices = scene.meshes[index].vertices_local
         if len(vertices):
-            boxes[index] = vertices.min(axis=0), vertices.max(axis=0)
+            boxes[index] = extent(vertices)
     corners = boxes[:, (UNIT_BOX > 0).astype(int), np.arange(3)][[instance.mesh for instance in scene.instances]]
     matrices = np.stack([np.asarray(instance.world_from_local, np.float64) for instance in scene.instances])
     with np.errstate(invalid="ignore"):

@@ -60,3 +60,12 @@ def test_trilinear_at_a_sample_picks_it_alone():
     indices, weights = grid.trilinear(np.array([[1.0, 2, 0], [2, 3, 4]]), (3, 4, 5))
     chosen = [indices[row][weights[row] > 0].tolist() for row in range(2)]
     assert chosen == [[2 * 3 + 1], [4 * 12 + 3 * 3 + 2]]
+
+
+def test_a_z_order_code_interleaves_the_bits_of_its_cells():
+    rng = np.random.default_rng(0)
+    for axes in (2, 3):
+        cells = rng.integers(0, 1 << grid.CURVE_BITS, (50, axes))
+        expected = [sum((int(cell[axis]) >> bit & 1) << 3 * bit + axis for bit in range(grid.CURVE_BITS) for axis in range(axes))
+                    for cell in cells]
+        assert grid.z_order(cells).tolist() == expected

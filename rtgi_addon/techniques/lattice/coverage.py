@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...errors import BakeError
+from ...numerics.blocks import blocks, cross
 from ...numerics.grid import transform_points
 from ...progress import Progress
 from ...scene import ProbeVolume, Scene
@@ -145,9 +146,12 @@ def surface_points(scene: Scene, count: int, most_area: float = np.inf) -> np.nd
 def _areas(mesh) -> np.ndarray:
     if not len(mesh.triangles) or mesh.triangles.min() < 0 or mesh.triangles.max() >= len(mesh.vertices_local):
         return np.zeros(0)
-    corners = mesh.vertices_local[mesh.triangles].astype(np.float64)
+    areas = np.empty(len(mesh.triangles))
     with np.errstate(all="ignore"):
-        return 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+        for rows in blocks(len(areas)):
+            corners = mesh.vertices_local[mesh.triangles[rows]].astype(np.float64)
+            areas[rows] = 0.5 * np.linalg.norm(cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    return areas
 
 
 def _scale(instance) -> float:

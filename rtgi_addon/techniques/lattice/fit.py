@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...errors import BakeError
+from ...numerics.blocks import blocks, extent
 from ...numerics.grid import box_corners, transform_points
 from ...scene import ProbeVolume, Scene
 from ...transport.rays.choose import make_tracer
@@ -187,15 +188,21 @@ def _world_boxes(meshes, instances) -> np.ndarray:
             points_of[instance.mesh] = _outline(meshes[instance.mesh].vertices_local, exact=uses[instance.mesh] <= _EXACT_USES)
         points = points_of[instance.mesh]
         if len(points) and np.isfinite(instance.world_from_local).all():
-            world = transform_points(instance.world_from_local, points)
-            boxes.append((world.min(axis=0), world.max(axis=0)))
+            boxes.append(_box(instance.world_from_local, points))
     return np.array(boxes).reshape(-1, 2, 3)
+
+
+def _box(world_from_local, points) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest corner (3,) in the world of ``points`` (n, 3), at least one."""
+    parts = np.array([extent(transform_points(world_from_local, points[rows])) for rows in blocks(len(points))])
+    return parts[:, 0].min(axis=0), parts[:, 1].max(axis=0)
 
 
 def _outline(vertices, exact):
     """Points (n, 3) whose world bounds are the mesh's (``exact``), or at least contain it: its local box's corners."""
-    vertices = vertices[np.isfinite(vertices).all(axis=1)]
+    if not np.isfinite(vertices).all():
+        vertices = vertices[np.isfinite(vertices).all(axis=1)]
     if exact or not len(vertices):
         return vertices
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    low, high = extent(vertices)
     return np.array([[(low, high)[i >> k & 1][k] for k in range(3)] for i in range(8)], np.float64)

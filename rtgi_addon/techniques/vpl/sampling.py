@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...numerics import octahedral
+from ...numerics.grid import z_order
 from ...numerics.sampling import hash_u32, sobol_owen, sphere_from_square
 from ...progress import Progress
 from ...scene import ProbeVolume
@@ -252,13 +253,7 @@ def morton(points: np.ndarray) -> np.ndarray:
         return np.zeros(0, np.uint64)
     low = points.min(axis=0)
     extent = max(float((points.max(axis=0) - low).max()), 1e-30)
-    cell = np.minimum((points - low) * (_MORTON_WIDTH / extent), 2**_MORTON_BITS - 1).astype(np.uint64)
-    code = np.zeros(len(points), np.uint64)
-    dimensions = points.shape[1]
-    for bit in range(_MORTON_BITS):
-        for axis in range(dimensions):
-            code |= ((cell[:, axis] >> np.uint64(bit)) & np.uint64(1)) << np.uint64(dimensions * bit + axis)
-    return code
+    return z_order(np.minimum((points - low) * (_MORTON_WIDTH / extent), 2**_MORTON_BITS - 1).astype(np.int64))
 
 
 def distant_lights(context: LightContext, pilots: Pilots, budget: int, seed: int) -> tuple[np.ndarray, np.ndarray]:

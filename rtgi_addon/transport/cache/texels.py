@@ -11,7 +11,10 @@ from functools import cached_property
 import numpy as np
 
 from ... import kernels
+from ...numerics.blocks import blocks
+from ...numerics.grid import CURVE_BITS, z_order
 from ..surfaces.geometry import Geometry, dense
+from ..vectors import dot
 from .texel_kernels import LayoutTables
 
 # Slots are addressed by a dense map of this many 32-bit entries at most (both sides): coarser texels beyond.
@@ -57,14 +60,19 @@ class TexelLayout:
 
     def __init__(self, geometry: Geometry, focus: Focus, lit_alike: np.ndarray | None = None):
         self._geometry, self._lit_alike = geometry, lit_alike
-        corners = geometry.triangles_world
-        # The corner opposite the longest edge: the grid runs along the two shorter edges from there.
-        lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
-        self._corner = ((np.argmax(lengths, axis=1) + 2) % 3).astype(np.int8)
-        rows = np.arange(geometry.count)
-        self._origin = corners[rows, self._corner]
-        self._edge_a = corners[rows, (self._corner + 1) % 3] - self._origin
-        self._edge_b = corners[rows, (self._corner + 2) % 3] - self._origin
+        count = geometry.count
+        self._corner = np.empty(count, np.int8)
+        self._origin, self._edge_a, self._edge_b = (np.empty((count, 3), np.float32) for _ in range(3))
+        for rows in blocks(count):
+            corners = geometry.triangles_world[rows]
+            first, second, third = (dot(edge, edge) for edge in (corners[:, (k + 1) % 3] - corners[:, k] for k in range(3)))
+            # The corner opposite the longest edge: the grid runs along the two shorter edges from there.
+            corner = np.where((first >= second) & (first >= third), 2, np.where(second >= third, 0, 1))
+            every = np.arange(len(corners))
+            origin = corners[every, corner]
+            self._corner[rows], self._origin[rows] = corner, origin
+            self._edge_a[rows] = corners[every, (corner + 1) % 3] - origin
+            self._edge_b[rows] = corners[every, (corner + 2) % 3] - origin
         self.size = float(focus.size)
         while not self._grid(focus):
             self.size *= 2.0
@@ -72,18 +80,21 @@ class TexelLayout:
     def _grid(self, focus: Focus) -> bool:
         width = np.float32(max(focus.radius, 1e-12) + NOMINAL_BEYOND * self.size)
         self._width = width
-        center = np.asarray(focus.center_world, np.float32)
-        distance = _distance(self._geometry.triangles_world, center)
-        size = self.size * np.sqrt(1.0 + (distance / width) ** 2)
-        self._axis_a = _Axis(self._edge_a, self._origin, center, width, size)
-        self._axis_b = _Axis(self._edge_b, self._origin, center, width, size)
-        cells = self._axis_a.cells.astype(np.int64) * self._axis_b.cells
-        shared = (cells == 1) | (self._geometry.areas < SHARED_BELOW * size**2)
+        center, count = np.asarray(focus.center_world, np.float32), self._geometry.count
+        self._axis_a, self._axis_b = _Axis(count), _Axis(count)
+        size, shared, own, halves = np.empty(count, np.float32), np.empty(count, bool), np.empty(count, np.int64), 0
+        for rows in blocks(count):
+            distance = _distance(self._geometry.triangles_world[rows], center)
+            side = size[rows] = self.size * np.sqrt(1.0 + (distance / width) ** 2)
+            for axis, edge in ((self._axis_a, self._edge_a), (self._axis_b, self._edge_b)):
+                axis.lay(rows, edge[rows], self._origin[rows], center, width, side)
+            a, b = (axis.cells[rows].astype(np.int64) for axis in (self._axis_a, self._axis_b))
+            cells, alone = a * b, self._geometry.areas[rows] >= SHARED_BELOW * side**2
+            alone &= cells > 1
+            shared[rows], own[rows] = ~alone, np.where(alone, cells, 0)
+            # Half of a triangle's parallelogram, and what its longest edge cuts.
+            halves += int(((cells + np.minimum(cells, a + b)) // 2)[alone].sum())
         group, group_count = self._cluster(np.flatnonzero(shared), size)
-        own = np.where(shared, 0, cells)
-        # Half of a triangle's parallelogram, and what its longest edge cuts.
-        edges = np.minimum(cells, self._axis_a.cells.astype(np.int64) + self._axis_b.cells)
-        halves = int(((cells + edges) // 2)[~shared].sum())
         total = group_count + int(own.sum())
         if 2 * total > MAX_SLOTS and self.size < _LARGEST * max(focus.radius, focus.size):
             return False
@@ -93,7 +104,7 @@ class TexelLayout:
         self._stride = np.where(shared, 0, self._axis_b.cells).astype(np.int32)
         self._axis_a.cells[shared] = 1
         self._axis_b.cells[shared] = 1
-        self._size = size.astype(np.float32)
+        self._size = size
         self._any_warp = bool(np.any(self._axis_a.warped & ~shared) or np.any(self._axis_b.warped & ~shared))
         self._group_count = group_count
         self.likely_texels = group_count + halves
@@ -109,27 +120,45 @@ class TexelLayout:
             self._members, self._member_cdf = triangles, np.zeros(1)
             self._group_starts = np.zeros(1, np.int64)
             return triangles, 0
-        corners = self._geometry.triangles_world[triangles]
-        level = np.round(np.log2(size[triangles] / self.size)).astype(np.int64)
-        cell = np.floor(corners.mean(axis=1) / (self.size * 2.0**level)[:, None]).astype(np.int64)
-        normal = self._geometry.normals_world[triangles]
-        # 26 facings: each axis is −, 0 or + of the rounded normal.
-        facing = np.rint(normal * 1.2).astype(np.int64) @ np.array([1, 3, 9]) + 13
-        key = np.zeros(len(triangles), np.uint64)
-        parts = [facing, self._geometry.material[triangles], level, cell[:, 0], cell[:, 1], cell[:, 2]]
-        if self._lit_alike is not None:
-            parts.append(self._lit_alike[self._geometry.instance[triangles]])
-        for part in parts:
-            key = (key ^ part.astype(np.int64).astype(np.uint64)) * np.uint64(0x9E3779B97F4A7C15)
-            key ^= key >> np.uint64(29)
-        _, group = np.unique(key, return_inverse=True)
-        group = group.reshape(-1)
-        order = np.argsort(group, kind="stable")
+        key = np.concatenate([self._group_key(triangles[rows], size) for rows in blocks(len(triangles))])
+        order = np.argsort(key, kind="stable")
+        key = key[order]
+        starts = np.flatnonzero(np.concatenate(([True], key[1:] != key[:-1])))
+        counts = np.diff(starts, append=len(order))
+        # Neighbours get neighbouring numbers: texels trace their rays by eight in a packet, and all find what they need in caches.
+        level, cell = self._place(triangles[order[starts]], size)
+        in_space = np.lexsort((key[starts], _along_curve(cell, level)))
+        starts, counts = starts[in_space], counts[in_space]
+        ends = np.cumsum(counts)
+        order = order[np.arange(len(order)) + np.repeat(starts - (ends - counts), counts)]
+        group = np.empty(len(order), np.int32)
+        group[order] = np.repeat(np.arange(len(counts), dtype=np.int32), counts)
         self._members = triangles[order]
         areas = self._geometry.areas[self._members].astype(np.float64)
         self._member_cdf = np.concatenate(([0.0], np.cumsum(np.maximum(areas, 1e-30))))
-        self._group_starts = np.concatenate((np.flatnonzero(np.diff(group[order], prepend=-1)), [len(order)]))
-        return group, len(self._group_starts) - 1
+        self._group_starts = np.concatenate(([0], ends))
+        return group, len(counts)
+
+    def _place(self, triangles: np.ndarray, size: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """How often cells in space are doubled at ``triangles`` (n,), and the cell (n, 3) that each lies in, int64."""
+        corners = self._geometry.triangles_world[triangles]
+        level = np.round(np.log2(size[triangles] / self.size)).astype(np.int64)
+        middle = (corners[:, 0] + corners[:, 1] + corners[:, 2]) / np.float32(3)
+        return level, np.floor(middle / (self.size * 2.0**level)[:, None]).astype(np.int64)
+
+    def _group_key(self, triangles: np.ndarray, size: np.ndarray) -> np.ndarray:
+        """A hash (n,) uint64 that those of ``triangles`` (n,) share which share a texel."""
+        level, cell = self._place(triangles, size)
+        # 26 facings: each axis is −, 0 or + of the rounded normal.
+        facing = np.rint(self._geometry.normals_world[triangles] * 1.2).astype(np.int64)
+        parts = [facing[:, 0] + 3 * facing[:, 1] + 9 * facing[:, 2] + 13, self._geometry.material[triangles], level, *cell.T]
+        if self._lit_alike is not None:
+            parts.append(self._lit_alike[self._geometry.instance[triangles]])
+        key = np.zeros(len(triangles), np.uint64)
+        for part in parts:
+            key = (key ^ part.astype(np.int64).astype(np.uint64)) * np.uint64(0x9E3779B97F4A7C15)
+            key ^= key >> np.uint64(29)
+        return key
 
     def slots(self, primitive: np.ndarray, u: np.ndarray, v: np.ndarray, front: np.ndarray) -> np.ndarray:
         """Slot (n,) int32 of hits at Embree barycentrics on the ``front`` (n,) bool side."""
@@ -253,9 +282,11 @@ class TexelLayout:
 def size_for(geometry: Geometry, center_world: np.ndarray, radius: float, texels: float) -> float:
     """Side [m] of texels so that there are about so many ``texels`` around a sphere of ``radius`` [m] about ``center_world``
     (3,): a triangle counts by what of it lies within, or by how small it looks from there."""
-    distance = _distance(geometry.triangles_world, center_world)
-    share = np.minimum(1.0, (radius / np.maximum(distance, radius)) ** 2)
-    area = np.minimum(geometry.areas * share, 4.0 * np.pi * radius**2).sum(dtype=np.float64)
+    area = 0.0
+    for rows in blocks(geometry.count):
+        distance = _distance(geometry.triangles_world[rows], center_world)
+        share = np.minimum(1.0, (radius / np.maximum(distance, radius)) ** 2)
+        area += float(np.minimum(geometry.areas[rows] * share, 4.0 * np.pi * radius**2).sum(dtype=np.float64))
     return float(np.sqrt(max(area, 1e-12) / texels))
 
 
@@ -270,6 +301,13 @@ def _distance(triangles: np.ndarray, point: np.ndarray) -> np.ndarray:
     return np.sqrt(squared)
 
 
+def _along_curve(cell: np.ndarray, level: np.ndarray) -> np.ndarray:
+    """Codes (n,) uint64 that put ``cell`` (n, 3) int64, each of 2^``level`` (n,) cells of level 0 along an axis, in the order of a
+    Z-order curve through them."""
+    place = (cell << level[:, None]) - (cell << level[:, None]).min(axis=0)
+    return z_order(place >> max(0, int(place.max()).bit_length() - CURVE_BITS))
+
+
 def side_of(slots: np.ndarray) -> np.ndarray:
     """(n, 1) float32: 1 where ``slots`` (n,) are on the front of their triangles, −1 where on the back."""
     return np.where(slots & 1, np.float32(1), np.float32(-1))[:, None]
@@ -278,17 +316,24 @@ def side_of(slots: np.ndarray) -> np.ndarray:
 class _Axis:
     """Cells along one edge of every triangle: uniform in asinh(x/w), x the distance along the edge from the focus' foot."""
 
-    def __init__(self, edge, origin, center, width, size):
-        self._length = np.maximum(np.sqrt(np.einsum("ij,ij->i", edge, edge)), np.float32(1e-12))
-        foot = np.einsum("ij,ij->i", center - origin, edge) / self._length
-        self._start = (-foot / width).astype(np.float32)
-        self._scale = (self._length / width).astype(np.float32)
-        end = self._start + self._scale
-        self.warped = np.maximum(np.abs(self._start), np.abs(end)) > _WARPED_BEYOND
-        self._low = np.where(self.warped, np.arcsinh(self._start), 0).astype(np.float32)
-        self._span = np.where(self.warped, np.arcsinh(end) - self._low, 1).astype(np.float32)
-        reach = np.where(self.warped, self._span * width, self._length)
-        self.cells = np.clip(np.ceil(reach / size - _SLACK), 1, _MOST_CELLS).astype(np.int32)
+    def __init__(self, count: int):
+        self._start, self._scale, self._low, self._span = (np.empty(count, np.float32) for _ in range(4))
+        self.warped, self.cells = np.empty(count, bool), np.empty(count, np.int32)
+
+    def lay(self, rows: slice, edge, origin, center, width, size) -> None:
+        """Divide the ``edge`` (n, 3) of the triangles in ``rows``, from ``origin`` (n, 3) on, into cells of ``size`` (n,)."""
+        length = np.maximum(np.sqrt(dot(edge, edge)), np.float32(1e-12))
+        start = -(dot(center - origin, edge) / length) / width
+        scale = length / width
+        end = start + scale
+        warped = np.maximum(np.abs(start), np.abs(end)) > _WARPED_BEYOND
+        low, span = np.zeros_like(start), np.ones_like(start)
+        bent = np.flatnonzero(warped)
+        low[bent] = np.arcsinh(start[bent])
+        span[bent] = np.arcsinh(end[bent]) - low[bent]
+        reach = np.where(warped, span * width, length)
+        self._start[rows], self._scale[rows], self._low[rows], self._span[rows], self.warped[rows] = start, scale, low, span, warped
+        self.cells[rows] = np.clip(np.ceil(reach / size - _SLACK), 1, _MOST_CELLS)
 
     def cell(self, primitive, t, any_warp):
         cells = self.cells[primitive]

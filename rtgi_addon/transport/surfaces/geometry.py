@@ -7,6 +7,7 @@ import numpy as np
 
 from ... import kernels
 from ...errors import BakeError
+from ...numerics.blocks import blocks, cross, extent
 from ...scene import Instance, Mesh, Scene
 
 
@@ -49,8 +50,7 @@ class Geometry:
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lowest and highest corner (3,) of all triangles."""
-        corners = self.triangles_world.reshape(-1, 3)
-        return corners.min(axis=0), corners.max(axis=0)
+        return extent(self.triangles_world.reshape(-1, 3))
 
     def part(self, triangles: np.ndarray) -> "Geometry":
         """Only the ``triangles`` (indices), numbered anew."""
@@ -89,22 +89,28 @@ def flatten(scene: Scene) -> Geometry:
         mesh = scene.meshes[instance.mesh]
         span = slice(start, start + count)
         start += count
-        triangles[span] = _world_vertices(mesh, instance)[mesh.triangles]
+        vertices = _world_vertices(mesh, instance)
+        for rows in blocks(count):
+            triangles[span][rows] = vertices[mesh.triangles[rows]]
         material[span] = _materials(mesh, instance)
         index[span] = i
         local[span] = np.arange(count, dtype=np.int32)
         mesh_triangle[span] = local[span] + np.int32(mesh_offsets[instance.mesh])
-    edges = triangles[:, 1:] - triangles[:, :1]
-    normals = np.cross(edges[:, 0], edges[:, 1])
-    lengths = np.sqrt(np.einsum("ij,ij->i", normals, normals))
-    normals /= np.maximum(lengths, np.finfo(np.float32).tiny)[:, None]
-    normals[mirrored[index]] *= -1.0
+    normals, lengths = np.empty((total, 3), np.float32), np.empty(total, np.float32)
+    for rows in blocks(total):
+        corners = triangles[rows]
+        across = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        lengths[rows] = np.sqrt(np.einsum("ij,ij->i", across, across))
+        normals[rows] = across / np.maximum(lengths[rows], np.finfo(np.float32).tiny)[:, None]
+    if mirrored.any():
+        normals[mirrored[index]] *= -1.0
     visibility = Visibility(*(np.array([getattr(instance, f"visible_{kind}") for instance in scene.instances], bool)
                               for kind in Visibility._fields))
     if not any(np.any(np.asarray(medium.scattering) > 0) for medium in scene.media):
         # No ray is of that kind: nothing is told apart by it.
         visibility = visibility._replace(scatter=visibility.camera | visibility.diffuse)
-    return Geometry(triangles, normals, lengths * np.float32(0.5), material, index, mesh_triangle, local, matrices, mesh_offsets,
+    lengths *= np.float32(0.5)
+    return Geometry(triangles, normals, lengths, material, index, mesh_triangle, local, matrices, mesh_offsets,
                     visibility)
 
 
@@ -120,7 +126,13 @@ def normal_matrices(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
 
 def _world_vertices(mesh: Mesh, instance: Instance) -> np.ndarray:
     matrix = np.asarray(instance.world_from_local, np.float64)
-    return (mesh.vertices_local @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32)
+    world = np.empty((len(mesh.vertices_local), 3), np.float32)
+    for rows in blocks(len(world)):
+        local = mesh.vertices_local[rows]
+        for axis in range(3):
+            world[rows, axis] = (local[:, 0] * matrix[axis, 0] + local[:, 1] * matrix[axis, 1] + local[:, 2] * matrix[axis, 2]
+                                 + matrix[axis, 3])
+    return world
 
 
 def _materials(mesh: Mesh, instance: Instance) -> np.ndarray:

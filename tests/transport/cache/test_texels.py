@@ -138,6 +138,19 @@ def test_small_triangles_share_a_texel_only_if_they_face_alike_and_lie_together(
         assert (geometry.normals_world[rows] @ geometry.normals_world[rows].T).min() > 0
 
 
+def test_shared_texels_are_numbered_along_a_curve_through_space():
+    geometry, layout = layout_of(turned(build.sphere(radius=1.0, subdivisions=5)), size=0.15, radius=5.0)
+    everywhere = np.arange(geometry.count, dtype=np.int32)
+    third = np.full(geometry.count, 1 / 3, np.float32)
+    group = layout.slots(everywhere, third, third, np.ones(geometry.count, bool)) >> 1
+    counts = np.bincount(group)
+    middle = np.stack([np.bincount(group, geometry.triangles_world.mean(axis=1)[:, axis]) for axis in range(3)], axis=1)
+    middle /= counts[:, None]
+    steps = np.linalg.norm(np.diff(middle, axis=0), axis=1)
+    # In any order neighbouring numbers would lie some 1.3 apart, as points on a sphere do.
+    assert len(counts) > 400 and counts.min() > 0 and steps.mean() < 0.25
+
+
 def test_materials_do_not_share_texels():
     mesh = build.sphere(subdivisions=4)
     material = (np.arange(len(mesh.triangles)) % 2).astype(np.int32)
