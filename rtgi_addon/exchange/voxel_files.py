@@ -2,7 +2,7 @@
 
 ```
 OUT/voxels/voxels.json   where the grid lies, its levels, the cones, the sky as harmonics
-OUT/voxels/rows.exr      Y, float: of every cell of every level its row in the lists, 0 for empty ones
+OUT/voxels/rows.exr      Y, float: of every cell of every level its row in the lists, 0 for empty ones; and a half, see docs
 OUT/voxels/cells.exr     R G B A, half: of each row three texels, opacity
 OUT/voxels/light.exr     R G B, half (float where it is brighter): of each row eight texels, radiance
 ```
@@ -60,7 +60,7 @@ def unfold(sheet: np.ndarray, count: int, texels: int) -> np.ndarray:
 
 def lists_of(tables: VoxelTables) -> dict[str, tuple[np.ndarray, int]]:
     """Items (n, texels, c) of the three lists, by name, and their texels."""
-    return {"rows": (tables.rows.astype(np.float32).reshape(-1, 1, 1), 1),
+    return {"rows": ((tables.rows + np.float32(0.5) * tables.wide).astype(np.float32).reshape(-1, 1, 1), 1),
             "cells": (tables.cells.astype(np.float16).reshape(-1, CELL_TEXELS, 4), CELL_TEXELS),
             "light": (tables.light, LIGHT_TEXELS)}
 
@@ -115,13 +115,15 @@ def read_voxels(bundle, known) -> ShippedVoxels:
         return unfold(sheet, count, texels)
 
     rows, cells, light = (read(name) for name in _LETTERS)
-    rows = rows.reshape(-1).astype(np.int32)
+    numbers = rows.reshape(-1)
+    rows, wide = numbers.astype(np.int32), numbers % 1 > 0
     shapes = np.array([[*level["resolution"], level["first"]] for level in index["levels"]], np.int64)
     if rows.min() < 0 or rows.max() >= len(cells) or np.count_nonzero(rows) != len(cells) - 1:
         raise BakeError(f"{bundle / index['rows']} names other rows than there are", RESTORE)
     grid = VoxelGrid(tuple(map(float, index["corner"])), float(index["cell"]), tuple(index["resolution"]))
-    return ShippedVoxels(VoxelTables(grid, shapes, rows, cells.reshape(len(cells), -1), light), index["cones"], index["step"],
-                         index["near"], np.array(index["sky"], np.float64), tuple(index["left"]))
+    tables = VoxelTables(grid, shapes, rows, cells.reshape(len(cells), -1), light, wide)
+    return ShippedVoxels(tables, index["cones"], index["step"], index["near"], np.array(index["sky"], np.float64),
+                         tuple(index["left"]))
 
 
 _LETTERS = {"rows": "Y", "cells": "RGBA", "light": "RGB"}

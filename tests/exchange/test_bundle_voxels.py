@@ -27,7 +27,7 @@ def write(out, field=Field):
 def test_what_is_written_is_read_back(tmp_path):
     path = write(tmp_path / "out")
     found, own = read_bundle(path).voxels, lit_voxels()
-    for name in ("rows", "cells", "light", "shapes"):
+    for name in ("rows", "cells", "light", "shapes", "wide"):
         assert np.array_equal(getattr(found.tables, name), getattr(own.tables, name))
     assert found.tables.grid == own.tables.grid and (found.cones, found.step, found.near) == (12, 0.5, 3.0)
     points, normals = np.float32([[0.3, 0.2, 0.1], [-1.2, 0.4, -0.5]]), np.float32([[0, 0, 1], [0.6, 0.8, 0]])

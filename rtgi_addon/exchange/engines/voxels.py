@@ -30,8 +30,8 @@ _HERE = Path(__file__).resolve().parent
 _SHADERS = _HERE.parents[1] / "shaders" / "include"
 # Texels of a line and lines of a slice, and slices that every driver has.
 _SIDE, _SLICES = 2048, 256
-# Rows that a float tells apart, with a half.
-_MOST_ROWS = 1 << 23
+# Rows that a float tells apart, with quarters.
+_MOST_ROWS = 1 << 22
 # Float32's share of what is found, and by how much points are moved to see where rounding decides [cells].
 _FLOAT, _NUDGE = 1e-3, 2e-4
 # Points whose answer changes by more than this share of the brightest are at the edge of a cell, and are not asked.
@@ -149,12 +149,13 @@ def kit_voxels(axes: Axes) -> EngineVoxels:
     opacity = np.where(kind[:, None] == 2, rng.uniform(0.1, 0.6, (count, 3)), rng.uniform(0.6, 1.0, (count, 3)))
     opacity = np.where(kind[:, None] == 0, np.minimum(np.abs(normal) * 1.2, 1.0), opacity).astype(np.float32)
     area = np.where(kind == 0, 1.0, rng.uniform(0.3, 1.5, count)) * grid.cell**2
-    nothing = np.zeros(0, int)
     middle = 0.3 * (rng.random((count, 3)) - 0.5)
-    voxels = Voxels(grid, cells, opacity, area, normal, np.zeros((count, 3)), lie, middle, kind != 2,
-                    Seen(*(nothing for _ in range(6))))
     radiance = (rng.random((count, 6, 3)) * np.repeat(opacity, 2, axis=1)[:, :, None]).astype(np.float32)
     sky = np.concatenate([[[1.5, 1.8, 2.2]], 0.2 * rng.normal(size=(8, 3))])
+    # Some faces are fronts, so there are walls here and there.
+    front, nothing = np.where(rng.random(6 * count) < 0.4, np.float32(1), np.float32(-1)), np.zeros(6 * count, np.float32)
+    seen = Seen(np.arange(6 * count), nothing + 1, nothing.astype(np.int32), nothing, nothing, front)
+    voxels = Voxels(grid, cells, opacity, area, normal, np.zeros((count, 3)), lie, middle, kind != 2, seen)
     tables = rounded(pack(build_hierarchy(voxels, radiance)))
     return EngineVoxels(ShippedVoxels(tables, 16, 0.5, 3.0, sky), axes)
 

@@ -27,8 +27,8 @@ from .tables import Tables
 
 # The samplers of include/voxels.glsl and include/voxel_sky.glsl.
 TEXTURES = ("voxel_rows", "voxel_cells", "voxel_light", "voxel_sky", "voxel_hidden", "voxel_bright")
-# Rows of voxels that a float tells apart, and halves.
-MOST_ROWS = 1 << 23
+# Rows of voxels that a float tells apart, and quarters.
+MOST_ROWS = 1 << 22
 # Cones of a receiver in a frame that others are averaged with.
 FRAME_CONES = 4
 # A share that no voxel takes more of.

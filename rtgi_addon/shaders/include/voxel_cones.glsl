@@ -10,14 +10,38 @@ struct ConeSample {
   vec3 shown;
 };
 
+// Where a sample lies among a level's cells: its array begins with an empty layer, and samples lie at cells' centres.
+vec3 cone_place(int level, vec3 position)
+{
+  return clamp(position / float(1 << level) + 0.5, vec3(0.0), vec3(indirect.level[level].xyz - 1));
+}
+
+// The lowest of the eight cells that a sample lies between.
+ivec3 cone_low(int level, vec3 place)
+{
+  return min(ivec3(place), indirect.level[level].xyz - 2);
+}
+
+// `lod`, or the largest whole number below it for which no level that the next sample from `at` on lies between has cells there that are
+// too wide for the walls in them.
+float cone_narrow(VoxelRay ray, float at, float step, float lod)
+{
+  for (int level = min(int(ceil(lod)), VOXEL_LEVELS - 1); level > 0; level--) {
+    if (lod > float(level - 1)) {
+      vec3 middle = ray.start + ray.direction * (at + 0.5 * step * exp2(lod));
+      float number = voxel_number(level, cone_low(level, cone_place(level, middle)));
+      lod = fract(2.0 * number) > 0.25 ? float(level - 1) : lod;
+    }
+  }
+  return lod;
+}
+
 // Add a level's trilinear sample.
 void cone_add(int level, vec3 position, vec3 direction, float weight, inout ConeSample met)
 {
-  ivec3 shape = indirect.level[level].xyz;
   float size = float(1 << level);
-  // The array begins with an empty layer, and samples lie at cells' centres.
-  vec3 place = clamp(position / size + 0.5, vec3(0.0), vec3(shape - 1));
-  ivec3 low = min(ivec3(place), shape - 2);
+  vec3 place = cone_place(level, position);
+  ivec3 low = cone_low(level, place);
   vec3 part = place - vec3(low);
   if (voxel_number(level, low) == 0.0) {
     return;
@@ -77,7 +101,7 @@ VoxelsSeen voxel_cone(VoxelRay ray, float spread, float step, float near)
     // Both levels that a sample lies between keep off.
     lod = min(min(lod, floor(log2(max(clear * at, 1.0)))), top);
     // A sheet lies in other places on other levels, so it is crossed on one.
-    level = sheet < 1.0 ? level : lod;
+    level = cone_narrow(ray, at, step, sheet < 1.0 ? level : lod);
     lod = level;
     float way = min(step * exp2(lod), leave - at);
     vec3 middle = ray.start + ray.direction * (at + 0.5 * way);

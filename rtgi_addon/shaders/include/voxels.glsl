@@ -32,7 +32,7 @@ struct Voxel {
 };
 
 // The row in the tables of a cell of a level, whose array begins with an empty layer: 0 for an empty one; and a half if it or one of the
-// seven cells up from it is not empty.
+// seven cells up from it is not empty, and a quarter if those are too wide for the walls in them.
 float voxel_number(int level, ivec3 padded)
 {
   ivec4 shape = indirect.level[level];

@@ -6,8 +6,9 @@ to 2 exactly (the common ¼ + 5·3/20 under 60° answers 6 % too little to a gra
 optical depth is interpolated, not opacity, so a slab does not depend on steps; the way up to NEAR cells is walked cell by cell;
 a cone is no wider than that the cells it reads keep off the receiver's own plane, which a cone of 30° under 60° touches all along;
 cells are half as large as the cone is wide, for what is read between cells of side s spreads by s/2 along each axis (their own
-s/√12 and the interpolation's s/√6), as a disc of 2s does; and while a cone crosses a sheet it stays on the level where it met it,
-since a sheet lies in other places on other levels, and a quarter of it would be met twice or never.
+s/√12 and the interpolation's s/√6), as a disc of 2s does; while a cone crosses a sheet it stays on the level where it met it,
+since a sheet lies in other places on other levels, and a quarter of it would be met twice or never; and beside walls of few cells
+none are read that are so wide that their faces show the mean of both sides (walls.py).
 """
 
 from typing import NamedTuple
@@ -109,7 +110,8 @@ def trace_cones(hierarchy: Hierarchy, origins: np.ndarray, directions: np.ndarra
         lod = np.log2(np.maximum(spread[rows] * position, 1.0))
         # Both levels that a sample lies between keep off.
         lod = np.minimum(np.minimum(lod, np.floor(np.log2(np.maximum(clear[rows] * position, 1.0)))), top)
-        lod = level[rows] = np.where(sheet[rows] < 1, level[rows], lod)
+        lod = np.where(sheet[rows] < 1, level[rows], lod)
+        lod = level[rows] = _narrow(hierarchy, start[rows], direction[rows], position, step, lod)
         advance = np.minimum(step * np.exp2(lod), leave[rows] - position)
         middle = position + 0.5 * advance
         met = _sample(hierarchy, start[rows] + direction[rows] * middle[:, None], direction[rows], lod)
@@ -147,6 +149,19 @@ def irradiance(hierarchy: Hierarchy, points: np.ndarray, normals: np.ndarray, co
     return total
 
 
+def _narrow(hierarchy: Hierarchy, start, direction, at, step, lod) -> np.ndarray:
+    """``lod`` (n,), or the largest whole number below it for which no level that the next sample from ``at`` (n,) on lies between
+    has cells there that are too wide for the walls in them."""
+    for index in range(len(hierarchy.levels) - 1, 0, -1):
+        level = hierarchy.levels[index]
+        rows = np.flatnonzero(lod > index - 1) if level.wide.any() else np.zeros(0, int)
+        if rows.size:
+            middle = start[rows] + direction[rows] * (at[rows] + 0.5 * step * np.exp2(lod[rows]))[:, None]
+            low, _ = _low(level, middle / level.size)
+            lod[rows[level.wide[low @ np.array(level.strides)]]] = index - 1
+    return lod
+
+
 class _Met(NamedTuple):
     """What samples (n,) find for each cell's length: optical ``depth`` (n,) and that times radiance, ``glow`` (n, 3); the ``share``
     (n,) of crossings of sheets, and that times radiance, ``shown`` (n, 3)."""
@@ -173,10 +188,7 @@ def _sample(hierarchy: Hierarchy, position, direction, lod) -> _Met:
 
 def _add(level: Level, position, direction, weight, rows, met: _Met) -> None:
     """Add one level's trilinear samples to ``met`` at ``rows``."""
-    # The array begins with an empty layer, and samples lie at cells' centres.
-    place = np.clip(position + 0.5, 0.0, np.array(level.shape[::-1]) - 1.0)
-    low = np.minimum(place.astype(np.int64), np.array(level.shape[::-1]) - 2)
-    part = (place - low).astype(np.float32)
+    low, part = _low(level, position)
     base, face, strides = low @ np.array(level.strides), 2 * np.arange(3) + (direction < 0), level.strides
     parts = [(1.0 - part[:, axis], part[:, axis]) for axis in range(3)]
     for corner in range(8):
@@ -196,3 +208,12 @@ def _add(level: Level, position, direction, weight, rows, met: _Met) -> None:
         met.share[at] += np.where(adds, depth, np.abs(through))
         shown = np.abs(through)[:, None] * level.shown[2 * row + (through > 0)]
         met.shown[at] += np.where(adds[:, None], glow, shown)
+
+
+def _low(level: Level, position) -> tuple[np.ndarray, np.ndarray]:
+    """The lowest (n, 3) of the eight cells that a sample at ``position`` (n, 3), in this level's cells, lies between, and how far
+    (n, 3) it is on the way from its centre."""
+    # The array begins with an empty layer, and samples lie at cells' centres.
+    place = np.clip(position + 0.5, 0.0, np.array(level.shape[::-1]) - 1.0)
+    low = np.minimum(place.astype(np.int64), np.array(level.shape[::-1]) - 2)
+    return low, (place - low).astype(np.float32)

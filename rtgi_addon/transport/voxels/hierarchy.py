@@ -24,6 +24,7 @@ import numpy as np
 
 from .grid import FACES, VoxelGrid
 from .voxelize import Voxels
+from .walls import Walls, too_wide
 
 # Optical depth of what lets nothing through: e^-12 is 6 in a million.
 OPAQUE = np.float32(12.0)
@@ -46,7 +47,8 @@ class Level:
     at 2·row for an eye that looks against that normal and 2·row + 1 for one that looks along it. ``adds`` (r,) bool tells cells of
     coarser levels whose surfaces are solid and lie in no plane: from afar these are parts of one surface as well, and ``depth``
     holds shares of crossings. Of the finest level's, ``plane`` (r, 5) float32 holds the unit normal, how far from the cell's centre
-    along it the sheet lies, in cells, and how much of the plane in the cell it fills.
+    along it the sheet lies, in cells, and how much of the plane in the cell it fills. ``wide`` (nz·ny·nx,) bool: where a sample
+    between a cell and the seven up from it would mix what walls keep apart (walls.py).
     """
 
     size: int
@@ -58,6 +60,7 @@ class Level:
     shown: np.ndarray
     adds: np.ndarray
     plane: np.ndarray | None
+    wide: np.ndarray
 
     @property
     def strides(self) -> tuple[int, int, int]:
@@ -89,19 +92,18 @@ class _Cells:
 
 def build_hierarchy(voxels: Voxels, radiance: np.ndarray, levels: int | None = None) -> Hierarchy:
     """``levels`` (None: until a single cell is left) of ``voxels`` whose faces show ``radiance`` (m, 6, 3), premultiplied."""
-    nx, ny, _ = voxels.grid.resolution
-    place = np.stack([voxels.cells % nx, voxels.cells // nx % ny, voxels.cells // (nx * ny)], axis=1)
+    place = voxels.place
     area = voxels.area / voxels.grid.cell**2
     cells = _Cells(place, voxels.opacity, radiance, area, voxels.lie, voxels.solid, voxels.middle)
     shape, size, made = voxels.grid.shape, 1, []
     while True:
-        made.append(_level(size, shape, cells))
+        made.append(_level(size, shape, cells, voxels.walls))
         if len(made) == levels or max(shape) == 1:
             return Hierarchy(voxels.grid, tuple(made))
         cells, shape, size = _coarser(cells, shape), tuple(-(-count // 2) for count in shape), 2 * size
 
 
-def _level(size: int, shape, cells: _Cells) -> Level:
+def _level(size: int, shape, cells: _Cells, walls: Walls) -> Level:
     place, opacity, count = cells.place, cells.opacity, len(cells.place) + 1
     padded = tuple(extent + 2 for extent in shape)
     row = np.zeros(int(np.prod(padded)), np.int32)
@@ -128,7 +130,7 @@ def _level(size: int, shape, cells: _Cells) -> Level:
         plane[1:, :3], plane[1:, 3] = normal, offset
         plane[1:, 4] = np.where(flat, np.minimum(_FILLED * cells.area / np.maximum(section(normal, offset), _CORNER), 1.0), 0.0)
     return Level(size, padded, row, depth, glow.reshape(-1, 3), sheet, shown.reshape(-1, 3),
-                 np.append(False, adds), plane)
+                 np.append(False, adds), plane, too_wide(walls, size, padded))
 
 
 def section(normal: np.ndarray, offset: np.ndarray) -> np.ndarray:

@@ -75,7 +75,7 @@ def without(voxels: Voxels, shown: np.ndarray, gone: np.ndarray, geometry: Geome
 
 def with_points(voxels: Voxels, radiance: np.ndarray, points: CameraPoints) -> tuple[Voxels, np.ndarray]:
     """``voxels`` whose faces show ``radiance`` (m, 6, 3), premultiplied, with ``points`` put in, and what their faces show then.
-    The result's ``seen`` is that of ``voxels``, by rows of theirs."""
+    The result's ``seen`` is that of ``voxels``: of what is put in fronts and walls are not known."""
     grid = voxels.grid
     column = np.floor(grid.cells_of(points.positions) + TIE).astype(np.int64)
     x, y, z = column.T
@@ -113,8 +113,9 @@ def with_points(voxels: Voxels, radiance: np.ndarray, points: CameraPoints) -> t
     solid = np.ones(count, bool)
     solid[before] = voxels.solid
     area = np.maximum(added, old)
+    seen = replace(voxels.seen, face=FACES * before.astype(np.int64)[voxels.seen.face // FACES] + voxels.seen.face % FACES)
     result = replace(voxels, cells=cells, opacity=opacity.astype(np.float32), area=area, normal=normal, albedo=albedo, lie=lie,
-                     middle=middle, solid=solid)
+                     middle=middle, solid=solid, seen=seen)
     return result, light.astype(np.float32)
 
 

@@ -19,14 +19,15 @@ COLOURS = FACES + 2
 @dataclass(frozen=True, eq=False)
 class VoxelTables:
     """All levels of ``grid`` one after the other. ``shapes`` (levels, 4) int64: cells along x, y, z with the empty layer around
-    them, and where the level begins in ``rows`` (c,) int32, which are 0 for empty cells. ``cells`` (r, CELL_NUMBERS) and
-    ``light`` (r, COLOURS, 3): of each row; row 0 is that of all empty cells."""
+    them, and where the level begins in ``rows`` (c,) int32, which are 0 for empty cells, and in ``wide`` (c,) bool (Level.wide).
+    ``cells`` (r, CELL_NUMBERS) and ``light`` (r, COLOURS, 3): of each row; row 0 is that of all empty cells."""
 
     grid: VoxelGrid
     shapes: np.ndarray
     rows: np.ndarray
     cells: np.ndarray
     light: np.ndarray
+    wide: np.ndarray
 
 
 def pack(hierarchy: Hierarchy) -> VoxelTables:
@@ -40,7 +41,7 @@ def pack(hierarchy: Hierarchy) -> VoxelTables:
         first += len(level.depth) - 1
         cells.append(_cells(level)[1:])
     return VoxelTables(hierarchy.grid, np.array(shapes, np.int64), np.concatenate(rows), np.concatenate(cells),
-                       pack_light(hierarchy))
+                       pack_light(hierarchy), np.concatenate([level.wide for level in hierarchy.levels]))
 
 
 def pack_light(hierarchy: Hierarchy) -> np.ndarray:
@@ -53,7 +54,7 @@ def pack_light(hierarchy: Hierarchy) -> np.ndarray:
 
 def row_numbers(tables: VoxelTables) -> np.ndarray:
     """(c,) float32 for shaders: the row of every cell of every level, and a half where it or one of the seven cells up from it,
-    which samples between them read, is not empty."""
+    which samples between them read, is not empty; and a quarter where those are too wide for the walls in them."""
     numbers, ends = tables.rows.astype(np.float32), np.append(tables.shapes[:, 3], len(tables.rows))
     for (nx, ny, nz, _), (begin, end) in zip(tables.shapes, pairwise(ends), strict=True):
         any_of_eight = (tables.rows[begin:end] > 0).reshape(nz, ny, nx)
@@ -61,6 +62,7 @@ def row_numbers(tables: VoxelTables) -> np.ndarray:
             here, up = (np.moveaxis(any_of_eight, axis, 0)[part] for part in (slice(None, -1), slice(1, None)))
             here |= up
         numbers[begin:end] += np.float32(0.5) * any_of_eight.ravel()
+    numbers += np.float32(0.25) * tables.wide
     return numbers
 
 
@@ -76,7 +78,7 @@ def unpack(tables: VoxelTables) -> Hierarchy:
         plane = np.concatenate([cells[:, 8:12], cells[:, 7:8]], axis=1) if index == 0 else None
         levels.append(Level(2**index, tuple(int(count) for count in tables.shapes[index, 2::-1]),
                             np.where(row > 0, row - first, 0).astype(np.int32), cells[:, :3], light[:, :FACES].reshape(-1, 3),
-                            cells[:, 4:7], light[:, FACES:].reshape(-1, 3), cells[:, 3] > 0.5, plane))
+                            cells[:, 4:7], light[:, FACES:].reshape(-1, 3), cells[:, 3] > 0.5, plane, tables.wide[begin:end]))
         first += count
     return Hierarchy(tables.grid, tuple(levels))
 

@@ -12,6 +12,7 @@ albedo); C. Crassin and S. Green, "Octree-Based Sparse Voxelization Using the GP
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from ..surfaces.geometry import Geometry
 from ..surfaces.materials import Surfaces
 from .crossings import TIE, Crossings, crossings, extremes
 from .grid import FACES, VoxelGrid
+from .walls import Walls, find_walls
 
 # Lines along each side of a column of cells.
 LINES = 4
@@ -64,6 +66,17 @@ class Voxels:
     middle: np.ndarray
     solid: np.ndarray
     seen: Seen
+
+    @property
+    def place(self) -> np.ndarray:
+        """(m, 3) int64: where the cells are along x, y and z."""
+        nx, ny, _ = self.grid.resolution
+        return np.stack([self.cells % nx, self.cells // nx % ny, self.cells // (nx * ny)], axis=1)
+
+    @cached_property
+    def walls(self) -> Walls:
+        """Walls of which both sides are here."""
+        return find_walls(self.place, self.by_face((self.seen.side > 0)[:, None])[..., 0])
 
     def by_face(self, values: np.ndarray) -> np.ndarray:
         """(m, 6, c) float32: sums over what each face shows of ``values`` (e, c) at the points of ``seen``, by weight. Of radiance

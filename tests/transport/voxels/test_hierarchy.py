@@ -12,7 +12,9 @@ from rtgi_addon.transport.surfaces.materials import Surfaces
 from rtgi_addon.transport.voxels import VoxelGrid, Voxels, cones, grid_around, voxelize
 from rtgi_addon.transport.voxels.hierarchy import build_hierarchy
 from rtgi_addon.transport.voxels.rays import march
+from rtgi_addon.transport.voxels.tables import pack, row_numbers, unpack
 from rtgi_addon.transport.voxels.voxelize import Seen
+from rtgi_addon.transport.voxels.walls import find_walls, too_wide
 
 
 def lit(meshes, box, resolution, radiance=1.0):
@@ -187,3 +189,38 @@ def test_walls_leak_no_more_than_anisotropic_voxels_do(layers, most):
         start = np.array([[24.0 + phase / 12, 24.0, first - 14.0 - phase / 12]])
         passed.append(cones.trace_cones(hierarchy, start, np.array([[0, 0, 1.0]]), np.array([np.tan(np.pi / 6)])).passed[0])
     assert np.mean(passed) <= most
+
+
+def columns(*faces):
+    """Shares of fronts (n, 6) of cells in a row along x: letters of each say which way fronts look there, < or >."""
+    return np.array([["<" in cell, ">" in cell, 0, 0, 0, 0] for cell in faces], float)
+
+
+def test_a_wall_is_what_has_its_inside_between_its_fronts():
+    place = np.array([[x, 3, 2] for x in (1, 4, 9, 11, 20)])
+    # A wall from 1 to 4, a corridor up to 9, whose other wall ends at 11; at 20 both sides are in one cell.
+    walls = find_walls(place, columns("<", ">", "<", ">", "<>"))
+    assert sorted(zip(walls.place[:, 0], walls.thickness, strict=True)) == [(1, 4), (4, 4), (9, 3), (11, 3), (20, 1)]
+    assert not len(find_walls(place, columns(">", "<", "", "", "<")).thickness)
+    # What is in other columns is another's; slivers of fronts are none.
+    assert not len(find_walls(place + np.arange(5)[:, None] * [0, 1, 0], columns("<", ">", "<", ">", ">")).thickness)
+    assert not len(find_walls(place, 0.1 * columns("<", ">", "<", ">", "<>")).thickness)
+
+
+def test_cells_are_too_wide_from_the_walls_twice_their_thickness_on():
+    walls = find_walls(np.array([[16, 8, 8], [19, 8, 8]]), columns("<", ">"))
+    for size, wide in ((2, False), (4, False), (8, False), (16, True)):
+        count = 32 // size + 2
+        found = too_wide(walls, size, (count, count, count)).reshape(count, count, count)
+        assert found.any() == wide
+        if wide:
+            # Cell 1 along each axis, after the empty layer the second along x, and what is read with it from below.
+            assert np.argwhere(found).tolist() == [[z, y, x] for z in (0, 1) for y in (0, 1) for x in (1, 2)]
+
+
+def test_lists_keep_where_cells_are_too_wide():
+    hierarchy = lit([build.cube("room", 3.0, inward=True), build.cube("block", 0.2)], [[-3, -3, -3], [3, 3, 3.0]], 40)
+    tables = pack(hierarchy)
+    again, numbers = unpack(tables), row_numbers(tables)
+    assert tables.wide.any() and np.array_equal(numbers * 4 % 2 == 1, tables.wide)
+    assert all(np.array_equal(one.wide, two.wide) for one, two in zip(hierarchy.levels, again.levels, strict=True))

@@ -14,6 +14,7 @@ from rtgi_addon.transport.voxels import VoxelGrid, voxelize
 from rtgi_addon.transport.voxels.hierarchy import build_hierarchy
 from rtgi_addon.transport.voxels.moving import CameraPoints, with_points, without
 from rtgi_addon.transport.voxels.rays import march
+from rtgi_addon.transport.voxels.voxelize import Seen
 
 GRID = VoxelGrid((-2.0, -2.0, -0.5), 0.125, (32, 32, 32))
 # A cell holds a row of pixels more or less than it should: a part in eight of them, here.
@@ -106,7 +107,7 @@ def test_a_camera_puts_in_what_lines_find():
     context, voxels = voxels_of(scene(floor=False))
     nothing = replace(voxels, cells=voxels.cells[:0], opacity=voxels.opacity[:0], area=voxels.area[:0],
                       normal=voxels.normal[:0], albedo=voxels.albedo[:0], lie=voxels.lie[:0], middle=voxels.middle[:0],
-                      solid=voxels.solid[:0])
+                      solid=voxels.solid[:0], seen=Seen(*(part[:0] for part in vars(voxels.seen).values())))
     put, radiance = with_points(nothing, np.zeros((0, 6, 3), np.float32), seen_by(context, camera(), radiance=2.0))
     _, top = voxels_of(scene(floor=False))
     known = {int(cell): row for row, cell in enumerate(top.cells)}
@@ -131,6 +132,10 @@ def test_what_is_known_is_not_put_in_twice():
     known = np.searchsorted(put.cells, voxels.cells)
     assert np.array_equal(put.cells[known], voxels.cells) and len(put.cells) <= 1.01 * len(voxels.cells)
     added = put.opacity[known] - voxels.opacity
+    # What is seen, and with it walls, stays with its cells.
+    assert np.array_equal(put.by_face(np.ones((len(put.seen.face), 1)))[known],
+                          voxels.by_face(np.ones((len(voxels.seen.face), 1))))
+    assert {tuple(row) for row in put.walls.place} == {tuple(row) for row in voxels.walls.place}
     # Noise of the lattice of pixels, and no sum of both.
     assert added.min() >= 0 and added.mean() < 0.01
     assert light.sum() == pytest.approx(radiance.sum(), rel=0.03)
