@@ -47,15 +47,18 @@ def minimize(function: Callable[[np.ndarray], tuple[float, np.ndarray]], start: 
     return place
 
 
-def solve(product: Callable[[np.ndarray], np.ndarray], right: np.ndarray, steps: int, enough: float = 1e-3) -> np.ndarray:
+def solve(product: Callable[[np.ndarray], np.ndarray], right: np.ndarray, steps: int, enough: float = 1e-3,
+          whole: np.ndarray | None = None) -> np.ndarray:
     """What ``product``, by a symmetric matrix without negative eigenvalues, turns into ``right`` (…, c), each of the c columns by
-    itself: up to ``steps`` steps of conjugate gradients from zero, fewer once what is missing is ``enough`` of ``right``."""
+    itself: up to ``steps`` steps of conjugate gradients from zero, fewer once what is missing is ``enough`` of ``right``, or of the
+    ``whole`` (…, c) of which ``right`` is what a first guess left."""
     found, missing = np.zeros_like(right), right.copy()
     direction = missing
     axes = tuple(range(right.ndim - 1))
-    power = first = np.sum(missing**2, axis=axes)
+    power = np.sum(missing**2, axis=axes)
+    little = enough**2 * (power if whole is None else np.sum(whole**2, axis=axes))
     for _ in range(steps):
-        if np.all(power <= enough**2 * first):
+        if np.all(power <= little):
             break
         turned = product(direction)
         curvature = np.sum(direction * turned, axis=axes)

@@ -31,6 +31,20 @@ def test_they_stop_when_enough_is_found_and_leave_alone_what_nothing_asks_for():
     assert np.linalg.norm(matrix @ found[:, 1] - right[:, 1]) < 0.1 * np.linalg.norm(right[:, 1])
 
 
+def test_a_first_guess_is_held_to_the_whole_not_to_what_it_left():
+    matrix = definite(20)
+    whole, calls = matrix @ np.ones((20, 1)), []
+
+    def product(x):
+        calls.append(1)
+        return matrix @ x
+
+    left = 0.05 * whole
+    assert not solve(product, left, 20, 0.1, whole).any() and not calls
+    found = solve(product, left, 20, 0.01, whole)
+    assert calls and np.linalg.norm(matrix @ found - left) <= 0.01 * np.linalg.norm(whole)
+
+
 def valley(x):
     """Rosenbrock's function and its gradient; 0 at (1, …, 1)."""
     along, across = 1.0 - x[:-1], x[1:] - x[:-1] ** 2

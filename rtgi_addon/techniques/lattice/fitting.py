@@ -28,10 +28,10 @@ from .reading import FieldReading, Stored, Weighed
 
 # What it costs to move away from what was measured, from dear to cheap: relative squared error of what is read, if all light
 # changes by as much as there is. What distances that change by a factor e cost, in each direction.
-PRICES, DISTANCE_PRICE = (3.0, 1.0, 0.3, 0.1, 0.03), 3e-4
+PRICES, DISTANCE_PRICE = (1.0, 0.2, 0.04), 3e-4
 # Steps of conjugate gradients for the coefficients, and of BFGS for distances; and how many of these may bring nothing at the held
 # points before it ends.
-LINEAR_STEPS, STEPS, PATIENCE = 30, 3, 2
+LINEAR_STEPS, STEPS, PATIENCE = 30, 2, 1
 FIRST_STEP = 0.2
 # Coefficients are found anew, so often, where dark targets became too bright: by this share of how far all is off.
 ROUNDS, LITTLE = 2, 0.1
@@ -68,19 +68,20 @@ class Targets:
 class Fit:
     """Fits what the probes of ``field``, read linearly, store to ``kinds`` of targets, each of which counts alike; ``held`` are as
     many kinds that the fit does not see. Of those, each of the ``guarded`` groups of kinds (numbers) must not get worse. Where the
-    first kind is off by no more than ``enough``, all stays as it was measured.
+    first kind is off by no more than ``enough``, all stays as it was measured. ``distances`` are fitted only where the targets are
+    said to tell them.
 
     ``stored`` is what did best, at which ``price``, None where nothing did better than the measurement; ``errors`` are, by kind,
     the relative RMSE at the held points (before, after). Raises Cancelled.
     """
 
     def __init__(self, field: ProbeField, kinds: list[Targets], held: list[Targets], guarded: tuple[tuple[int, ...], ...],
-                 enough: float, threads: int | None, progress: Progress):
+                 enough: float, distances: bool, threads: int | None, progress: Progress):
         self._live = np.concatenate([lookup.live for lookup in field.lookups])
         self._count = max(1, int(self._live.sum()))
         self._progress, self._guarded = progress, guarded
         measured = measured_by(field)
-        self._numbers = numbers_of(sh.order_of(measured.coefficients.shape[1]), field.lookups[0].tile)
+        self._distances = distances
         self._asked, self._judge = (_Asked(field, targets, measured, threads) for targets in (kinds, held))
         self.stored, self.price = measured, None
         self._before = self._best = self._judge.squares(measured, self._judge.weigh(measured))
@@ -90,12 +91,11 @@ class Fit:
                        for kind in range(len(kinds))]
 
     def _find(self, measured: Stored) -> None:
-        # Coefficients alone, then distances and all, then coefficients once more: their price is found anew each time. Fewer
-        # targets than there are numbers do not tell distances.
+        # Coefficients alone, then distances and all, then coefficients once more: their price is found anew each time.
         self._progress.step(0.0, LABEL)
         self._asked.balance(measured)
         found = self._priced(measured, measured, PRICES)
-        if len(self._asked.weight) + len(self._judge.weight) < self._count * self._numbers:
+        if not self._distances:
             return
         self._move(measured, found, PRICES[-1])
         if self.stored.mean is not measured.mean:
@@ -187,11 +187,10 @@ def measured_by(field: ProbeField) -> Stored:
 
 
 class _Weighed(NamedTuple):
-    """Targets as they are ``weighed``, the normal ``equations`` of that, and their right side (p, k, 3), ``wanted``."""
+    """Targets as they are ``weighed``, and the normal ``equations`` of that."""
 
     weighed: list[Weighed]
     equations: Equations
-    wanted: np.ndarray
 
 
 class _Asked:
@@ -233,8 +232,7 @@ class _Asked:
 
     def equations(self, weighed) -> "_Weighed":
         """What the coefficients should be where targets are ``weighed`` so."""
-        return _Weighed(weighed, self.reading.equations(weighed, self.weight),
-                        self.reading.by_coefficients(weighed, self.weight[:, None] * self.irradiance))
+        return _Weighed(weighed, self.reading.equations(weighed, self.weight, self.irradiance))
 
     def squares(self, stored: Stored, weighed) -> np.ndarray:
         """Each target's share (n,) of the squared relative RMSE of its kind."""
@@ -267,14 +265,12 @@ class _Problem:
         asked, measured, weighed = self.asked, self._measured.coefficients, of.weighed
         change = np.where(self._scale > 0, (start.coefficients - measured) / np.where(self._scale > 0, self._scale, 1.0), 0.0)
         for _ in range(ROUNDS):
-            equations, wanted = of.equations, of.wanted
+            equations = of.equations
             if len(self._bright):
                 weight, light = np.zeros_like(asked.weight), np.zeros_like(asked.irradiance)
-                weight[self._bright] = DARK_WEIGHT * asked.weight[self._bright]
-                light[self._bright] = weight[self._bright, None] * self._allowed
-                equations = equations.join([equations, asked.reading.equations(weighed, weight)])
-                wanted = wanted + asked.reading.by_coefficients(weighed, light)
-            missing = wanted - equations.product(measured)
+                weight[self._bright], light[self._bright] = DARK_WEIGHT * asked.weight[self._bright], self._allowed
+                equations = equations.join([equations, asked.reading.equations(weighed, weight, light)])
+            missing = equations.wanted() - equations.product(measured)
             change = equations.best(missing, self._scale, cost, change, LINEAR_STEPS)
             coefficients = measured + self._scale * change
             read = asked.reading.read(weighed, coefficients)

@@ -247,10 +247,11 @@ class FieldReading:
         return np.concatenate([reading.by_coefficients(own, share * gradient[rows])
                                for (_, rows, share, reading), own in zip(self._parts, weighed, strict=True)])
 
-    def equations(self, weighed: list[Weighed], weight: np.ndarray) -> Equations:
-        """The normal equations of the coefficients (p, k) for points that count by ``weight`` (n,)."""
+    def equations(self, weighed: list[Weighed], weight: np.ndarray, light: np.ndarray) -> Equations:
+        """The normal equations of the coefficients (p, k) for points that count by ``weight`` (n,) and should read ``light``
+        (n, 3)."""
         shares = [share * reading.by_corner(own) for (_, _, share, reading), own in zip(self._parts, weighed, strict=True)]
-        parts = [cells.weighed(np.concatenate([shares[lattice][at] for lattice, at in places], axis=1), weight[rows])
+        parts = [cells.weighed(np.concatenate([shares[lattice][at] for lattice, at in places], axis=1), weight[rows], light[rows])
                  for rows, places, cells in self._cells]
         return Equations.join(parts)
 

@@ -44,8 +44,8 @@ class SurfaceFit:
         self._seen = [~rows for rows in held]
         require_memory({"the fit to surfaces": BYTES_PER_READ * sum(len(rows) for rows in held)})
         self._fit = Fit(field, [one.take(rows) for one, rows in zip(targets, self._seen, strict=True)],
-                        [one.take(rows) for one, rows in zip(targets, held, strict=True)], _GUARDED, _ENOUGH, bake.context.threads,
-                        progress.span(_POINTS, 1.0))
+                        [one.take(rows) for one, rows in zip(targets, held, strict=True)], _GUARDED, _ENOUGH,
+                        self._points.tell_distances, bake.context.threads, progress.span(_POINTS, 1.0))
         self.rays = self._points.rays
         self.grids = self._fitted(field, grids, self._fit.stored)
 

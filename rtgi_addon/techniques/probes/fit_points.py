@@ -26,15 +26,16 @@ from .shares import TEXEL_COST
 
 # Rays from every probe that tell which texels probes see.
 SIGHT_RAYS = 64
-# Points of each kind for every probe, the fewest and the most of them, and under how many normals each point off a surface is read.
+# Points of each kind for every probe, the fewest and the most of them on surfaces, the part of those that is kept to off them; and
+# under how many normals each point off a surface is read.
 SURFACE_POINTS, AIR_POINTS = 64, 64
 FEWEST_POINTS, MOST_POINTS = 2048, 1 << 15
-NORMALS = 3
+OFF_PART, NORMALS = 2, 2
 # Rays from each of those: their noise is averaged over many.
 AIR_RAYS = 64
 # What a point that is read costs in a whole fit, in rays, and where coefficients are fitted alone; and the share of its bake's work
 # that a fit may take: where the bake was cheap there are fewer points, down to the fewest.
-READ_COST, LINEAR_COST, WORK_SHARE = 30.0, 15.0, 0.8
+READ_COST, LINEAR_COST, WORK_SHARE = 40.0, 20.0, 0.7
 # One point of so many is kept from the fit, to judge it.
 HELD = 4
 # So many points of a probe, within those limits, are close above what is dark, and weigh this share of the others above surfaces:
@@ -80,17 +81,20 @@ class FitPoints:
 
     def _counts(self, probes: int, any_dark: bool) -> tuple[int, int, int]:
         """Points on surfaces, in the air and above the dark."""
-        bake, wanted = self._bake, ((SURFACE_POINTS, 1), (AIR_POINTS, 2), (DARK_POINTS * any_dark, 2))
+        bake, wanted = self._bake, ((SURFACE_POINTS, 1), (AIR_POINTS, OFF_PART), (DARK_POINTS * any_dark, OFF_PART))
         least = [FEWEST_POINTS // part if each else 0 for each, part in wanted]
         counts = [int(np.clip(each * probes, few, MOST_POINTS // part)) for few, (each, part) in zip(least, wanted, strict=True)]
         work = WORK_SHARE * (bake.ray_count + TEXEL_COST * bake.cache.rays * bake.cache.count)
         surface, air, dark = counts
         off = 2 * air + dark
         read = surface + NORMALS * off
-        share = min(1.0, work / (off * AIR_RAYS + READ_COST * read))
-        if share * read < numbers_of(bake.settings.order, bake.settings.visibility_resolution) * probes:
-            share = min(1.0, work / (off * AIR_RAYS + LINEAR_COST * read))
-        return tuple(max(few, int(share * count)) for few, count in zip(least, counts, strict=True))
+        numbers = probes * numbers_of(bake.settings.order, bake.settings.visibility_resolution)
+        share = work / (off * AIR_RAYS + READ_COST * read)
+        # Fewer points than there are numbers do not tell distances.
+        self.tell_distances = min(1.0, share) * read >= numbers
+        if not self.tell_distances:
+            share = work / (off * AIR_RAYS + LINEAR_COST * read)
+        return tuple(max(few, int(min(1.0, share) * count)) for few, count in zip(least, counts, strict=True))
 
     def _seen_texels(self, progress: Progress) -> np.ndarray:
         """Texels (t,) that probes see, on surfaces inside the volumes or less than half a cell outside."""

@@ -25,7 +25,7 @@ class ProbeSettings:
                             256, 1 << 20)
     visibility_resolution: int = setting(8, "Visibility Tile", "Side of each probe's octahedral tile of distances", "px", 4, 32)
     fit: bool = setting(False, "Fit to Surfaces", "Change what probes store so that surfaces, and what moves, read from them what "
-                        "is nearest to the light there: better light from the same probes, for up to three times the time")
+                        "is nearest to the light there: better light from the same probes, for up to twice the time")
     virtual_offset: bool = setting(True, "Virtual Offset", "Move probes that lie just inside geometry out of it")
     texel_size: float | None = setting(None, "Texel Size", "Side of the surface cache's texels; unset chooses it from scene, "
                                        "spacing and target error", "m", 1e-6, 1e6)

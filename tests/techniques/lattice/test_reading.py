@@ -98,8 +98,11 @@ def test_the_normal_equations_are_those_of_what_is_read():
     weighed, rng = reading.weigh(measured_by(field)), np.random.default_rng(8)
     coefficients, weight = rng.normal(size=measured_by(field).coefficients.shape), rng.random(len(points))
     expected = reading.by_coefficients(weighed, weight[:, None] * reading.read(weighed, coefficients).irradiance)
-    found = reading.equations(weighed, weight).product(coefficients)
-    np.testing.assert_allclose(found, expected, atol=1e-4 * np.abs(expected).max())
+    light = rng.normal(size=(len(points), 3))
+    equations = reading.equations(weighed, weight, light)
+    np.testing.assert_allclose(equations.product(coefficients), expected, atol=1e-4 * np.abs(expected).max())
+    right = reading.by_coefficients(weighed, weight[:, None] * light)
+    np.testing.assert_allclose(equations.wanted(), right, atol=1e-4 * np.abs(right).max())
 
 
 def test_curvature_is_the_square_of_what_each_number_moves():
@@ -128,7 +131,7 @@ def test_threads_change_nothing():
         read, weighed = read_of(reading, stored)
         found.append([read.irradiance, *reading.by_distances(stored, weighed, read, read.irradiance),
                       reading.by_coefficients(weighed, read.irradiance),
-                      reading.equations(weighed, np.ones(len(points))).product(stored.coefficients)])
+                      reading.equations(weighed, np.ones(len(points)), read.irradiance).product(stored.coefficients)])
     assert all(np.array_equal(one, other) for one, other in zip(*found, strict=True))
 
 

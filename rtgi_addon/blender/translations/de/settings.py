@@ -32,9 +32,9 @@ SETTINGS: dict[str, str] = {
     "Side of each probe's octahedral tile of distances": "Seitenlänge der oktaedrischen Kachel von Abständen jeder Sonde",
     "Fit to Surfaces": "An Flächen anpassen",
     "Change what probes store so that surfaces, and what moves, read from them what is nearest to the light there: better light "
-    "from the same probes, for up to three times the time":
+    "from the same probes, for up to twice the time":
         "Was Sonden speichern, so ändern, dass Flächen und Bewegtes aus ihnen lesen, was dem Licht dort am nächsten ist: besseres "
-        "Licht aus denselben Sonden, in bis zu dreimal so langer Zeit",
+        "Licht aus denselben Sonden, in bis zu doppelt so langer Zeit",
     "Virtual Offset": "Virtueller Versatz",
     "Move probes that lie just inside geometry out of it": "Sonden, die knapp in Geometrie liegen, aus ihr herausrücken",
     "Texel Size": "Texelgröße",
