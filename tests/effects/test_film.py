@@ -80,6 +80,23 @@ def test_a_picture_ends_at_its_error_and_says_so(context):
     assert np.sqrt(np.square(off).mean()) < 1.5 * 0.012 * level
 
 
+class KnownInPart:
+    """Light that is known to be 1 in every other pixel."""
+
+    def at(self, pixel, points, normals, width):
+        """See KnownLight.at."""
+        return np.ones(points.shape, np.float32), pixel % 2 == 0
+
+
+def test_samples_that_refine_a_picture_gather_what_is_unknown_whatever_the_budget(context):
+    """Of large pictures not all pixels have rays in each sample; those that refine them have."""
+    pixel, effect = np.arange(SIZE[0] * SIZE[1]), get("ray_traced")
+    samples = Samples(SIZE, pixel, np.full(pixel.size, 5), np.zeros((pixel.size, 2)), KnownInPart())
+    frame = draw_samples(context, None, view(), samples)
+    ample, scarce = (effect.apply(frame, None, effect.Settings(16, budget=budget)) for budget in (100.0, 0.001))
+    assert np.array_equal(ample, scarce)
+
+
 def test_pictures_by_need_are_the_same_for_any_number_of_threads():
     one, many = (by_rays(stage(), 0.015, 32, threads=threads) for threads in (1, 3))
     assert one.samples == many.samples > FIRST and np.array_equal(one.pictures["combined"], many.pictures["combined"])

@@ -66,8 +66,9 @@ class RayTracedEffect(Effect):
         if context is None or not seen.any() or settings.diffuse_rays == settings.glossy_rays == 0:
             return frame.light
         scene, surfaces, threads = cached_scene(context, frame), seen_surfaces(frame.gbuffer, frame.view), context.threads
-        spacing = spacing_of(len(surfaces.points) * settings.diffuse_rays, settings)
         known, unknown = _known_light(frame, surfaces, settings)
+        # Samples that refine a picture gather what the others do not know, few of them, for themselves alone.
+        spacing = spacing_of(len(surfaces.points) * settings.diffuse_rays, settings) if known is None else 1
         diffuse = Pixels.of(frame, surfaces, max(1, settings.diffuse_rays), spacing)
         diffuse = diffuse if known is None else diffuse.part(unknown)
         glossy = Pixels.of(frame, surfaces, max(1, settings.glossy_rays))
