@@ -5,7 +5,6 @@ RTGI_GODOT holds the command that starts a Godot 4.6, with a display for the tes
 folder: tools/readme_pictures.py makes the README's of them.
 """
 
-import os
 import re
 import shutil
 import subprocess
@@ -16,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from engine_pictures import atrium, keep, through_our_filter
-from real_godot import complaints, drawing, godot, imported, replacing
+from real_godot import complaints, drawing, godot, imported, needs_godot, replacing
 
 from rtgi_addon.exchange import engines
 from rtgi_addon.exchange.engines import ExportSettings
@@ -25,8 +24,7 @@ ROOT = Path(__file__).resolve().parents[2]
 CORNELL = ROOT / "sample_blends/cornell_box.blend"
 SIZE = 240
 
-pytestmark = [pytest.mark.slow, pytest.mark.skipif(
-    "RTGI_GODOT" not in os.environ, reason="needs a real Godot: RTGI_GODOT is the command that starts it")]
+pytestmark = [pytest.mark.slow, needs_godot]
 
 
 @pytest.fixture(scope="module")

@@ -4,13 +4,12 @@ RTGI_GODOT is what test_godot.py says it is.
 """
 
 import json
-import os
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from atlas_bundles import atlas_bundle, light_atlas, relit_atlas_bundle
-from real_godot import complaints, drawing, godot, imported, replacing
+from real_godot import damaged, drawn, each_renderer, finds, headless, imported, opens, real
 
 from rtgi_addon.effects.atlas.relight import relit_atlas
 from rtgi_addon.effects.atlas.sheet import LightAtlas
@@ -26,7 +25,7 @@ from rtgi_addon.scene import World
 from rtgi_addon.techniques.transfer.lighting import DistantSun, Lighting, sky_of
 
 GODOT = engines.get("godot")
-real = pytest.mark.skipif("RTGI_GODOT" not in os.environ, reason="needs a real Godot: RTGI_GODOT is the command that starts it")
+SCRIPT, FOLLOWING = "conformance/atlas.gd", "conformance/atlas_relight.gd"
 
 
 @pytest.fixture(scope="module")
@@ -82,44 +81,23 @@ def project(whole):
     return imported(whole.out)
 
 
-def conformance(project, *words):
-    return godot(project, *words, "--script", "conformance/atlas.gd")
-
-
 @real
-@pytest.mark.slow
 def test_scripts_agree_without_a_display(project):
-    code, said = conformance(project, "--headless")
-    assert code == 0 and said.count("PASS ") == 4 and "FAIL" not in said and not complaints(said), said
+    headless(project, SCRIPT, 4)
 
 
 @real
-@pytest.mark.slow
-@pytest.mark.parametrize("options", [("--rendering-driver", "vulkan"), ("--rendering-driver", "opengl3")],
-                         ids=["forward+", "compatibility"])
+@each_renderer
 def test_shaders_agree(project, options):
-    code, said = conformance(project, *options)
-    drawing(said)
-    assert code == 0 and said.count("PASS ") == 8 and "FAIL" not in said and not complaints(said), said
-    code, said = godot(project, *options, "--quit-after", 4)
-    assert code == 0 and not complaints(said), said
+    drawn(project, SCRIPT, options, 8)
+    opens(project, options)
 
 
 @real
-@pytest.mark.slow
 def test_damage_is_found(project):
-    old, new = "1.0233267 * normal.y, 1.0233267 * normal.z", "1.0233267 * normal.z, 1.0233267 * normal.y"
     paths = [project / folder / "irradiance.gdshaderinc" for folder in ("rtgi", "conformance/kit")]
-    texts = [path.read_text() for path in paths]
-    try:
-        for path, text in zip(paths, texts, strict=True):
-            path.write_text(replacing(old, new)(text))
-        code, said = conformance(project, "--rendering-driver", "opengl3")
-        drawing(said)
-        assert code == 1 and "FAIL kit, light atlas, shader" in said, said
-    finally:
-        for path, text in zip(paths, texts, strict=True):
-            path.write_text(text)
+    with damaged(paths, "1.0233267 * normal.y, 1.0233267 * normal.z", "1.0233267 * normal.z, 1.0233267 * normal.y"):
+        finds(project, SCRIPT, "kit, light atlas, shader")
 
 
 @pytest.fixture(scope="module")
@@ -160,29 +138,16 @@ def relit_project(relit):
 
 
 @real
-@pytest.mark.slow
-@pytest.mark.parametrize("options", [("--rendering-driver", "vulkan"), ("--rendering-driver", "opengl3")],
-                         ids=["forward+", "compatibility"])
+@each_renderer
 def test_shaders_follow_light(relit_project, options):
-    code, said = godot(relit_project, *options, "--script", "conformance/atlas_relight.gd")
-    drawing(said)
-    assert code == 0 and said.count("PASS relit") == 48 and "FAIL" not in said and not complaints(said), said
-    code, said = godot(relit_project, *options, "--quit-after", 4)
-    assert code == 0 and not complaints(said), said
+    assert drawn(relit_project, FOLLOWING, options, 48).count("PASS relit") == 48
+    opens(relit_project, options)
 
 
 @real
-@pytest.mark.slow
-@pytest.mark.parametrize(("file", "damage"), [("atlas.gd", replacing("first + 3", "first")),
-                                              ("atlas_relight.gdshader", replacing("texel, 3)", "texel, channel)"))],
+@pytest.mark.parametrize(("file", "old", "new"), [("atlas.gd", "first + 3", "first"),
+                                                  ("atlas_relight.gdshader", "texel, 3)", "texel, channel)")],
                          ids=["script", "shader"])
-def test_damage_to_what_follows_is_found(relit_project, file, damage):
-    path = relit_project / "rtgi" / file
-    whole = path.read_text()
-    try:
-        path.write_text(damage(whole))
-        code, said = godot(relit_project, "--rendering-driver", "opengl3", "--script", "conformance/atlas_relight.gd")
-    finally:
-        path.write_text(whole)
-    drawing(said)
-    assert code == 1 and "FAIL relit kit atlas, a sky with bright spots" in said, said
+def test_damage_to_what_follows_is_found(relit_project, file, old, new):
+    with damaged([relit_project / "rtgi" / file], old, new):
+        finds(relit_project, FOLLOWING, "relit kit atlas, a sky with bright spots")

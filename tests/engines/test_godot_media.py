@@ -4,7 +4,6 @@ RTGI_GODOT is what test_godot.py says it is.
 """
 
 import json
-import os
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from media_bundles import box, even_light, fog, media_bundle, smoke
-from real_godot import complaints, drawing, godot, imported, replacing
+from real_godot import complaints, damaged, drawing, drawn, each_renderer, finds, godot, headless, imported, real
 from scene_builders import transform as moved
 
 from rtgi_addon.exchange import engines
@@ -20,8 +19,8 @@ from rtgi_addon.exchange.engines import ExportSettings
 from rtgi_addon.exchange.exr import read_exr
 
 GODOT = engines.get("godot")
-SCRIPT = Path(__file__).parent / "godot_media.gd"
-real = pytest.mark.skipif("RTGI_GODOT" not in os.environ, reason="needs a real Godot: RTGI_GODOT is the command that starts it")
+SCRIPT = "conformance/media.gd"
+CAMERA = Path(__file__).parent / "godot_media.gd"
 
 
 @pytest.fixture(scope="module")
@@ -59,29 +58,18 @@ def project(whole):
     return imported(whole.out)
 
 
-def conformance(project, *words):
-    return godot(project, *words, "--script", "conformance/media.gd")
-
-
 @real
-@pytest.mark.slow
 def test_scripts_agree_without_a_display(project):
-    code, said = conformance(project, "--headless")
-    assert code == 0 and said.count("PASS ") == 8 and "FAIL" not in said and not complaints(said), said
+    headless(project, SCRIPT, 8)
 
 
 @real
-@pytest.mark.slow
-@pytest.mark.parametrize("options", [("--rendering-driver", "vulkan"), ("--rendering-driver", "opengl3")],
-                         ids=["forward+", "compatibility"])
+@each_renderer
 def test_shaders_agree(project, options):
-    code, said = conformance(project, *options)
-    drawing(said)
-    assert code == 0 and said.count("PASS ") == 16 and "FAIL" not in said and not complaints(said), said
+    drawn(project, SCRIPT, options, 16)
 
 
 @real
-@pytest.mark.slow
 @pytest.mark.parametrize(("file", "old", "new", "failing"), [
     ("media_functions.gdshaderinc", "moments.x * scattered", "scattered", "kit, media at points, shader"),
     ("media_functions.gdshaderinc", "mix(thick,", "mix(vec3(1.0),", "kit, media along rays, shader"),
@@ -89,27 +77,19 @@ def test_shaders_agree(project, options):
     ("media.gdshaderinc", "rtgi_media_turn * direction", "direction", "kit, media at points, shader, moved")],
     ids=["phase", "slices", "blocks", "turned"])
 def test_the_kit_finds_damage(project, file, old, new, failing):
-    path = project / "conformance/kit" / file
-    text = path.read_text()
-    try:
-        path.write_text(replacing(old, new)(text))
-        code, said = conformance(project, "--rendering-driver", "vulkan")
-    finally:
-        path.write_text(text)
-    drawing(said)
-    assert code == 1 and f"FAIL {failing}:" in said and "FAIL bundle" not in said, said
+    with damaged([project / "conformance/kit" / file], old, new):
+        assert "FAIL bundle" not in finds(project, SCRIPT, f"{failing}:", "vulkan")
 
 
 def seen(project, distance, radiance, how):
     """What a camera sees of a wall, as Godot's fog (how 1) or the view (2) shows it."""
-    code, said = godot(project, "--rendering-driver", "vulkan", "--script", SCRIPT, "--", distance, radiance, how)
+    code, said = godot(project, "--rendering-driver", "vulkan", "--script", CAMERA, "--", distance, radiance, how)
     drawing(said)
     assert code == 0 and not complaints(said), said
     return np.array([float(value) for value in re.search(r"found (\S+) (\S+) (\S+)", said).groups()])
 
 
 @real
-@pytest.mark.slow
 def test_a_slab_takes_what_it_takes(tmp_path):
     """A wall behind 4 m of an absorbing box, and behind 10 m of fog."""
     dark = even_light(0.0)
@@ -124,7 +104,6 @@ def test_a_slab_takes_what_it_takes(tmp_path):
 
 
 @real
-@pytest.mark.slow
 def test_a_medium_that_only_scatters_is_not_seen_in_even_light(tmp_path):
     white = replace(fog(0.1), scattering=np.full(3, 0.1), absorption=np.zeros(3))
     project = imported(GODOT.export(media_bundle(white, grids=even_light(1.0)), tmp_path / "out",

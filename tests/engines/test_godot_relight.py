@@ -1,15 +1,13 @@
 """Relighting exported to Godot, in a real Godot (see test_godot.py): held to `rtgi relight`, and its sample with a time of day."""
 
-import os
-
 import pytest
-from real_godot import complaints, drawing, godot, imported, replacing
+from real_godot import complaints, damaged, drawing, drawn, finds, godot, imported, needs_godot
 from transfer_bundles import transfer_bundle
 
 from rtgi_addon.exchange import engines
 
-pytestmark = [pytest.mark.slow, pytest.mark.skipif(
-    "RTGI_GODOT" not in os.environ, reason="needs a real Godot: RTGI_GODOT is the command that starts it")]
+SCRIPT = "conformance/relight.gd"
+pytestmark = [pytest.mark.slow, needs_godot]
 
 
 @pytest.fixture(scope="module")
@@ -18,21 +16,15 @@ def project(tmp_path_factory):
     return imported(engines.get("godot").export(transfer_bundle(), tmp_path_factory.mktemp("godot") / "kit").out)
 
 
-def relight(project, *words):
-    return godot(project, *words, "--script", "conformance/relight.gd")
-
-
 def test_scripts_agree_without_a_display(project):
-    code, said = relight(project, "--headless")
+    code, said = godot(project, "--headless", "--script", SCRIPT)
     assert code == 0 and said.count("PASS relit") == 24 and "SKIP the shader" in said and not complaints(said), said
 
 
 @pytest.mark.parametrize("options", [("--rendering-driver", "vulkan"), ("--rendering-method", "mobile"),
                                      ("--rendering-driver", "opengl3")], ids=["forward+", "mobile", "compatibility"])
 def test_shaders_agree(project, options):
-    code, said = relight(project, *options)
-    drawing(said)
-    assert code == 0 and said.count("PASS relit") == 48 and "FAIL" not in said and not complaints(said), said
+    assert drawn(project, SCRIPT, options, 48).count("PASS relit") == 48
 
 
 def test_the_probes_as_baked_are_read_through_pictures(project):
@@ -42,22 +34,15 @@ def test_the_probes_as_baked_are_read_through_pictures(project):
     assert code == 0 and "FAIL" not in said and "PASS visibility, shader, moved" in said and not complaints(said), said
 
 
-@pytest.mark.parametrize(("file", "damage", "failing"), [
-    ("relight.gdshader", replacing("36.0 * strength", "30.0 * strength"), "as it was baked, shader"),
-    ("relight.gdshader", replacing("1.09254843 * n.x * n.z", "-1.09254843 * n.x * n.z"), "a sky with bright spots, shader"),
-    ("relit.gd", replacing("f.x * (1.0 - f.y)", "f.x * (1.0 - f.x)"), "a sun at noon, script"),
-    ("relit.gd", replacing("36.0) * high", "30.0) * high"), "as it was baked, script"),
+@pytest.mark.parametrize(("file", "old", "new", "failing"), [
+    ("relight.gdshader", "36.0 * strength", "30.0 * strength", "as it was baked, shader"),
+    ("relight.gdshader", "1.09254843 * n.x * n.z", "-1.09254843 * n.x * n.z", "a sky with bright spots, shader"),
+    ("relit.gd", "f.x * (1.0 - f.y)", "f.x * (1.0 - f.x)", "a sun at noon, script"),
+    ("relit.gd", "36.0) * high", "30.0) * high", "as it was baked, script"),
 ], ids=["window", "a harmonic", "shares", "window in scripts"])
-def test_the_kit_finds_damage(project, file, damage, failing):
-    path = project / "rtgi" / file
-    whole = path.read_text()
-    try:
-        path.write_text(damage(whole))
-        code, said = relight(project, "--rendering-driver", "opengl3")
-    finally:
-        path.write_text(whole)
-    drawing(said)
-    assert code == 1 and f"FAIL relit kit, {failing}" in said, said
+def test_the_kit_finds_damage(project, file, old, new, failing):
+    with damaged([project / "rtgi" / file], old, new):
+        finds(project, SCRIPT, f"relit kit, {failing}")
 
 
 def test_the_sample_follows_the_hour(project):

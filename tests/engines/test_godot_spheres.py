@@ -4,18 +4,17 @@ RTGI_GODOT is what test_godot.py says it is.
 """
 
 import json
-import os
 
 import numpy as np
 import pytest
-from real_godot import complaints, drawing, godot, imported, replacing
+from real_godot import damaged, drawn, each_renderer, finds, headless, imported, opens, real
 from sphere_bundles import sphere_bundle
 
 from rtgi_addon.exchange import engines
 from rtgi_addon.exchange.exr import read_exr
 
 GODOT = engines.get("godot")
-real = pytest.mark.skipif("RTGI_GODOT" not in os.environ, reason="needs a real Godot: RTGI_GODOT is the command that starts it")
+SCRIPT = "conformance/spheres.gd"
 
 
 @pytest.fixture(scope="module")
@@ -48,46 +47,24 @@ def project(whole):
     return imported(whole.out)
 
 
-def conformance(project, *words):
-    return godot(project, *words, "--script", "conformance/spheres.gd")
-
-
 @real
-@pytest.mark.slow
 def test_scripts_agree_without_a_display(project):
-    code, said = conformance(project, "--headless")
-    assert code == 0 and said.count("PASS ") == 4 and "FAIL" not in said and not complaints(said), said
+    headless(project, SCRIPT, 4)
 
 
 @real
-@pytest.mark.slow
-@pytest.mark.parametrize("options", [("--rendering-driver", "vulkan"), ("--rendering-driver", "opengl3")],
-                         ids=["forward+", "compatibility"])
+@each_renderer
 def test_shaders_agree(project, options):
-    code, said = conformance(project, *options)
-    drawing(said)
-    assert code == 0 and said.count("PASS ") == 8 and "FAIL" not in said and not complaints(said), said
-    code, said = godot(project, *options, "--quit-after", 4)
-    assert code == 0 and not complaints(said), said
+    drawn(project, SCRIPT, options, 8)
+    opens(project, options)
 
 
 @real
-@pytest.mark.slow
 @pytest.mark.parametrize(("old", "new", "failing"), [
     ("alpha * reach / max(away, 1e-12)", "alpha", "kit, sphere probes, shader"),
     ("left -= share", "left -= 0.0", "kit, sphere probes, shader"),
     ("mat3(rtgi_spheres_local_from_world) * direction_world", "direction_world", "kit, sphere probes, shader, moved")],
     ids=["width", "weights", "turned"])
 def test_damage_is_found(project, old, new, failing):
-    for folder in ("rtgi", "conformance/kit"):
-        path = project / folder / "irradiance.gdshaderinc"
-        text = path.read_text()
-        path.write_text(replacing(old, new)(text))
-    try:
-        code, said = conformance(project, "--rendering-driver", "opengl3")
-        drawing(said)
-        assert code == 1 and f"FAIL {failing}" in said, said
-    finally:
-        for folder in ("rtgi", "conformance/kit"):
-            path = project / folder / "irradiance.gdshaderinc"
-            path.write_text(replacing(new, old)(path.read_text()) if new in path.read_text() else path.read_text())
+    with damaged([project / folder / "irradiance.gdshaderinc" for folder in ("rtgi", "conformance/kit")], old, new):
+        finds(project, SCRIPT, failing)

@@ -1,17 +1,15 @@
 """A style in a real Godot: what the export writes is read without a word, and its lines are ours, pixel by pixel."""
 
-import os
 
 import pytest
-from real_godot import complaints, drawing, godot, imported
+from real_godot import complaints, drawing, godot, imported, needs_godot
 
 from rtgi_addon.effects.stylized import EFFECT
 from rtgi_addon.effects.stylized.presets import STYLES
 from rtgi_addon.exchange import engines
 from rtgi_addon.exchange.engines import ExportSettings
 
-pytestmark = [pytest.mark.slow, pytest.mark.skipif(
-    "RTGI_GODOT" not in os.environ, reason="needs a real Godot: RTGI_GODOT is the command that starts it")]
+pytestmark = [pytest.mark.slow, needs_godot]
 
 
 def test_the_lines_are_those_of_the_effect(kit_bundle, tmp_path):

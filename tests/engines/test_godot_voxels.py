@@ -4,7 +4,6 @@ RTGI_GODOT is what test_godot.py says it is.
 """
 
 import json
-import os
 import re
 import shutil
 from dataclasses import replace
@@ -12,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from real_godot import complaints, drawing, godot, imported, replacing
+from real_godot import complaints, damaged, drawing, drawn, each_renderer, finds, godot, imported, real
 from voxel_bundles import lit_voxels, voxel_bundle
 
 from rtgi_addon.errors import BakeError
@@ -22,7 +21,7 @@ from rtgi_addon.exchange.engines.voxels import engine_voxels
 from rtgi_addon.exchange.exr import read_exr
 
 GODOT = engines.get("godot")
-real = pytest.mark.skipif("RTGI_GODOT" not in os.environ, reason="needs a real Godot: RTGI_GODOT is the command that starts it")
+SCRIPT = "conformance/voxels.gd"
 
 
 @pytest.fixture(scope="module")
@@ -70,17 +69,12 @@ def project(whole):
 
 
 @real
-@pytest.mark.slow
-@pytest.mark.parametrize("options", [("--rendering-driver", "vulkan"), ("--rendering-driver", "opengl3")],
-                         ids=["forward+", "compatibility"])
+@each_renderer
 def test_shaders_agree(project, options):
-    code, said = godot(project, *options, "--script", "conformance/voxels.gd")
-    drawing(said)
-    assert code == 0 and said.count("PASS ") == 4 and "FAIL" not in said and not complaints(said), said
+    drawn(project, SCRIPT, options, 4)
 
 
 @real
-@pytest.mark.slow
 def test_a_surface_is_lit(project):
     shutil.copy(Path(__file__).with_name("godot_voxels.gd"), project / "surface_check.gd")
     code, said = godot(project, "--rendering-driver", "opengl3", "--script", "surface_check.gd")
@@ -89,14 +83,6 @@ def test_a_surface_is_lit(project):
 
 
 @real
-@pytest.mark.slow
 def test_damage_is_found(project):
-    path = project / "rtgi/voxels.gdshaderinc"
-    text = path.read_text()
-    try:
-        path.write_text(replacing("RTGI_CONE_TIGHT * met.share", "0.5 * met.share")(text))
-        code, said = godot(project, "--rendering-driver", "opengl3", "--script", "conformance/voxels.gd")
-        drawing(said)
-        assert code == 1 and "FAIL bundle, voxels, shader" in said, said
-    finally:
-        path.write_text(text)
+    with damaged([project / "rtgi/voxels.gdshaderinc"], "RTGI_CONE_TIGHT * met.share", "0.5 * met.share"):
+        finds(project, SCRIPT, "bundle, voxels, shader")

@@ -4,11 +4,22 @@ import os
 import re
 import shlex
 import subprocess
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
+needs_godot = pytest.mark.skipif("RTGI_GODOT" not in os.environ,
+                                 reason="needs a real Godot: RTGI_GODOT is the command that starts it")
+# The two ways in which Godot draws that differ most.
+each_renderer = pytest.mark.parametrize("options", [("--rendering-driver", "vulkan"), ("--rendering-driver", "opengl3")],
+                                        ids=["forward+", "compatibility"])
+
+
+def real(test):
+    """Mark a test that runs a Godot."""
+    return needs_godot(pytest.mark.slow(test))
 
 
 def godot(project, *words):
@@ -44,3 +55,48 @@ def replacing(text, wrong):
         return whole.replace(text, wrong)
 
     return damage
+
+
+@contextmanager
+def damaged(paths, text, wrong):
+    """Files that say ``wrong`` in the place of ``text`` for as long as it lasts."""
+    whole = [path.read_text() for path in paths]
+    try:
+        for path, before in zip(paths, whole, strict=True):
+            path.write_text(replacing(text, wrong)(before))
+        yield
+    finally:
+        for path, before in zip(paths, whole, strict=True):
+            path.write_text(before)
+
+
+def headless(project, script, count):
+    """Hold a conformance script's ``count`` checks to pass without a display."""
+    _all_pass(godot(project, "--headless", "--script", script), count)
+
+
+def drawn(project, script, options, count):
+    """Hold a conformance script's ``count`` checks to pass as Godot draws with ``options``; what it said."""
+    ran = godot(project, *options, "--script", script)
+    drawing(ran[1])
+    _all_pass(ran, count)
+    return ran[1]
+
+
+def opens(project, options):
+    """Hold the project to run for some frames without a word."""
+    code, said = godot(project, *options, "--quit-after", 4)
+    assert code == 0 and not complaints(said), said
+
+
+def finds(project, script, failing, driver="opengl3"):
+    """Hold a conformance script to fail with a line that begins ``FAIL failing``; what it said."""
+    code, said = godot(project, "--rendering-driver", driver, "--script", script)
+    drawing(said)
+    assert code == 1 and f"FAIL {failing}" in said, said
+    return said
+
+
+def _all_pass(ran, count):
+    code, said = ran
+    assert code == 0 and said.count("PASS ") == count and "FAIL" not in said and not complaints(said), said
