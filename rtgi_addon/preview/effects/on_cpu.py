@@ -1,5 +1,7 @@
 """An effect that has no half on the GPU: the frame comes back as arrays, and its picture goes up again."""
 
+from functools import partial
+
 import gpu
 
 from ...effects import Chosen, Frame, History
@@ -20,20 +22,29 @@ class OnCpu:
         self.chosen = chosen
         self.passes: dict[str, gpu.types.GPUTexture] = {}
         self._history: History | None = None
-        self._context: tuple[Scene, LightContext | None] | None = None
+        self._contexts = _KeptContext()
 
     def draw(self, frame: GpuFrame) -> gpu.types.GPUTexture:
         """See Half."""
         gbuffer = GBuffer(**{name: download(texture) for name, texture in frame.gbuffer.items()})
         drawn = Frame(frame.scene, frame.view, gbuffer, download(frame.direct), download(frame.irradiance), download(frame.light),
                       frame.index, tuple(frame.offset), frame.transparent, None if frame.before is None else self._history,
-                      lambda: self._context_of(frame.scene))
+                      partial(self._contexts.of, frame.scene))
         after = apply_all(drawn, frame.field, [self.chosen])
         self._history = after.history
         self.passes = {name: upload(image) for name, image in after.passes.items()}
         return upload(after.light)
 
-    def _context_of(self, scene: Scene) -> LightContext | None:
-        if self._context is None or self._context[0] is not scene:
-            self._context = scene, light_context(scene)
-        return self._context[1]
+
+class _KeptContext:
+    """The context of the scene that was asked for last: apart from the half, whose history would else refer to it (see
+    FieldLight.close)."""
+
+    def __init__(self):
+        self._kept: tuple[Scene, LightContext | None] | None = None
+
+    def of(self, scene: Scene) -> LightContext | None:
+        """Rays through ``scene``."""
+        if self._kept is None or self._kept[0] is not scene:
+            self._kept = scene, light_context(scene)
+        return self._kept[1]

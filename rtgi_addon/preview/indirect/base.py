@@ -55,7 +55,10 @@ class FieldLight:
         return False
 
     def close(self) -> None:
-        """Let go of workers."""
+        """Let go of workers, and of what is on the GPU: here, for whoever lets go of it last may be another thread. Under Vulkan
+        Blender takes what another thread lets go of from under commands that it has not sent yet, and crashes. For the same reason
+        no light may refer to itself: Python collects such cycles on whichever thread it happens to be."""
+        self.samplers, self.uniforms = {}, {}
 
 
 def irradiance(light, points: np.ndarray, normals: np.ndarray) -> np.ndarray:

@@ -35,7 +35,12 @@ class LpvLight(RelitLight):
         self._settings = settings if field.bake is None else field.bake.settings
         # Read from files it has neither geometry volumes nor anything to make them by.
         self.captures = self._settings is not None
-        super().__init__(field, lpv_tables, self._baked if self.captures else None)
+        super().__init__(field, lpv_tables)
+
+    @property
+    def can_follow(self) -> bool:
+        """See RelitLight."""
+        return self.captures
 
     def follow(self, scene: Scene) -> bool:
         """See FieldLight: only of what was read from files."""
@@ -62,16 +67,21 @@ class LpvLight(RelitLight):
             # The worker is behind what is drawn: that meets the light at its new places at least.
             self._light(self._drawn)
 
-    def _light(self, drawn: Drawn) -> None:
-        if self._live is None:
-            self._live = LiveVolumes(self._field.bake, self._field.world_volumes)
-        self._live.light(drawn)
-        self.samplers, self.error = self._live.textures, None
+    def close(self) -> None:
+        """See FieldLight."""
+        super().close()
+        self._live = self._drawn = None
 
-    def _baked(self, scene: Scene, progress: Progress) -> LpvField:
-        """The field of ``scene``. A worker's kernels are numpy's: Blender's GPU works on the main thread only."""
+    def relit(self, scene: Scene, progress: Progress) -> LpvField:
+        """See RelitLight. A worker's kernels are numpy's: Blender's GPU works on the main thread only."""
         bake = self._field.bake
         if bake is not None and not changed_surfaces(bake.context.scene, scene):
             return bake.relight(scene, progress, NUMPY)
         seed = _SEED if bake is None else bake.seed
         return bake_field(LightContext(scene), self._settings, seed, NUMPY, progress)
+
+    def _light(self, drawn: Drawn) -> None:
+        if self._live is None:
+            self._live = LiveVolumes(self._field.bake, self._field.world_volumes)
+        self._live.light(drawn)
+        self.samplers, self.error = self._live.textures, None

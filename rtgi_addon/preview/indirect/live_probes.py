@@ -1,28 +1,27 @@
 """Live probes in the preview: a worker traces frame after frame while anything changes, and the picture shows the newest that is
 there. Nothing waits for it."""
 
-import threading
 from dataclasses import replace
 
 import gpu
 
 from ...errors import Cancelled
-from ...progress import Progress
 from ...scene import Scene, World
 from ...techniques.base import Field
 from ...techniques.probes.live import LiveProbes, LiveSettings
 from ...transport.parallel import thread_count
 from ..indirect_pass import WorldLight
-from .base import FieldLight
+from .following import FollowingLight
 from .probes import probe_tables
 from .tables import Tables
 
 
-class LiveProbesLight(FieldLight):
+class LiveProbesLight(FollowingLight):
     """Probes of ``scene`` that are kept up to date as ``settings`` say: dark before their first frame. ``field`` is what is shown
     (None: nothing yet), ``notes`` what of the scene it does not follow."""
 
     follows_surfaces = True
+    thread_name = "rtgi live probes"
 
     def __init__(self, settings: LiveSettings, scene: Scene):
         # Without the base's: there are no tables yet.
@@ -32,52 +31,15 @@ class LiveProbesLight(FieldLight):
         self.field: Field | None = None
         self.notes: tuple[str, ...] = ()
         self._settings = settings
-        self._lock = threading.Lock()
         self._live: LiveProbes | None = None
-        self._waiting: Scene | None = None
-        self._result: tuple[Field, Tables, tuple[str, ...]] | Exception | None = None
-        self._worker: threading.Thread | None = None
-        self._progress = Progress()
+        self._begin()
         self.follow(scene)
 
-    @property
-    def busy(self) -> bool:
-        """See FieldLight."""
-        with self._lock:
-            return self._worker is not None or self._result is not None
-
-    def follow(self, scene: Scene) -> bool:
-        """See FieldLight: lamps, world, volumes and surfaces, all on the worker."""
-        with self._lock:
-            self._waiting = scene
-            if self._worker is None:
-                self._worker = threading.Thread(target=self._work, name="rtgi live probes", daemon=True)
-                self._worker.start()
-        return self.error is None
-
-    def update(self) -> bool:
-        """See FieldLight."""
-        with self._lock:
-            result, self._result = self._result, None
-        if result is None:
-            return False
-        if isinstance(result, Exception):
-            self.error = str(result)
-            return False
-        self.error = None
-        self.field, tables, self.notes = result
+    def take(self, field: Field, tables: Tables, notes: tuple[str, ...]) -> None:
+        """See FollowingLight."""
+        self.field, self.notes = field, notes
         self.set(tables)
-        self.direct_lamps = self.field.direct_lamps
-        return True
-
-    def close(self) -> None:
-        """See FieldLight; waits until the worker has felt it."""
-        self._progress.cancel()
-        with self._lock:
-            self._waiting = self._result = None
-            worker = self._worker
-        if worker is not None:
-            worker.join()
+        self.direct_lamps = field.direct_lamps
 
     def _work(self) -> None:
         """Frames until the light has settled and nothing waits, or something fails."""
@@ -94,8 +56,8 @@ class LiveProbesLight(FieldLight):
                 result, shown = self._step(scene, threads)
             except Cancelled:
                 result, shown, self._live = None, True, None
-            except Exception as error:  # it belongs to who asks with `update`
-                result, shown, self._live = error, True, None
+            except Exception as error:  # it belongs to who asks with `update`; its frames refer to it, and to this light
+                result, shown, self._live = error.with_traceback(None), True, None
             with self._lock:
                 self._result = self._result if result is None else result
 

@@ -42,9 +42,14 @@ class LiveVoxelsLight(RelitLight):
     def __init__(self, settings: VoxelSettings, field: VoxelField | None, scene: Scene, samples: int | None = None):
         self.field, self._settings, self._newest = field, settings, field
         self._samples, self._drawn, self._moved, self._followed = samples, scene, None, None
-        super().__init__(field, partial(tables_of_field, samples=samples), self._made, holds_direct=False)
+        super().__init__(field, partial(tables_of_field, samples=samples), holds_direct=False)
         if field is None:
             self.follow(scene)
+
+    @property
+    def can_follow(self) -> bool:
+        """See RelitLight."""
+        return True
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -84,8 +89,8 @@ class LiveVoxelsLight(RelitLight):
             moved = moved_since(self.field.context.scene, self._drawn)
             self._moved = moved if moved.any else None
 
-    def _made(self, scene: Scene, progress: Progress) -> VoxelField:
-        """The field of ``scene``; the newest one's voxels stay as long as they hold the same surfaces. On the worker."""
+    def relit(self, scene: Scene, progress: Progress) -> VoxelField:
+        """See RelitLight; the newest field's voxels stay as long as they hold the same surfaces."""
         # Lamps that no bake knows shine, and nothing that they light does.
         scene = replace(scene, lights=tuple(light for light in scene.lights if light.bake != NOT_AT_ALL))
         before = self._newest

@@ -1,19 +1,18 @@
 """Fields that are relit by the CPU, on a thread beside the picture."""
 
-import threading
 from collections.abc import Callable
 
 from ...errors import Cancelled
 from ...progress import Progress
 from ...scene import Scene
 from ...techniques.base import Field
-from .base import FieldLight
+from .following import FollowingLight
 from .tables import DARK, Tables
 
 
-class RelitLight(FieldLight):
+class RelitLight(FollowingLight):
     """The irradiance function of ``field`` (None: dark until the first is there), followed through ``relight`` on a worker (None:
-    the field's own).
+    the field's own). What needs more than the field is a ``relit`` of its own: no light may refer to itself (see ``close``).
 
     ``tables_of`` makes the tables of a field; it runs on the worker too. ``holds_direct`` says whether they have the lamps' direct
     light that is in the field. Scenes that arrive while one is worked on wait for it, all but the newest forgotten, so that light
@@ -30,44 +29,24 @@ class RelitLight(FieldLight):
         self._holds_direct, self.atlas = holds_direct, getattr(field, "atlas", None)
         self._tables_of, self._relight = tables_of, relight or getattr(field, "relight", None)
         self._name = getattr(field, "technique", None)
-        self._lock = threading.Lock()
-        self._waiting: Scene | None = None
-        self._result: tuple[Field, Tables] | Exception | None = None
-        self._worker: threading.Thread | None = None
-        self._progress = Progress()
         self._refine, self._refining = refine, Progress()
+        self._begin()
 
     @property
-    def busy(self) -> bool:
-        """See FieldLight."""
-        with self._lock:
-            return self._worker is not None or self._result is not None
+    def can_follow(self) -> bool:
+        """Whether there is a way to the light of another scene."""
+        return self._relight is not None
+
+    def relit(self, scene: Scene, progress: Progress) -> Field:
+        """The field in the light of ``scene``; on the worker."""
+        return self._relight(scene, progress)
 
     def follow(self, scene: Scene) -> bool:
         """See FieldLight."""
-        if self._relight is None:
+        if not self.can_follow:
             self.error = f"{self._name} cannot follow a change of light: bake again"
             return False
-        with self._lock:
-            self._waiting = scene
-            self._refining.cancel()
-            if self._worker is None:
-                self._worker = threading.Thread(target=self._work, name="rtgi relight", daemon=True)
-                self._worker.start()
-        return self.error is None
-
-    def update(self) -> bool:
-        """See FieldLight."""
-        with self._lock:
-            result, self._result = self._result, None
-        if result is None:
-            return False
-        if isinstance(result, Exception):
-            self.error = str(result)
-            return False
-        self.error = None
-        self.take(*result)
-        return True
+        return super().follow(scene)
 
     def take(self, field: Field, tables: Tables) -> None:
         """Show the relit ``field``."""
@@ -75,20 +54,8 @@ class RelitLight(FieldLight):
         self.atlas = field.atlas
         self.direct_lamps = field.direct_lamps if self._holds_direct else frozenset()
 
-    def forget(self) -> None:
-        """Drop what waits and what has come out; what is being worked on will be shown still."""
-        with self._lock:
-            self._waiting = self._result = None
-
-    def close(self) -> None:
-        """See FieldLight; waits until the worker has felt it."""
-        self.forget()
-        self._progress.cancel()
-        with self._lock:
-            self._refining.cancel()
-        worker = self._worker
-        if worker is not None:
-            worker.join()
+    def _interrupt(self) -> None:
+        self._refining.cancel()
 
     def _work(self) -> None:
         while True:
@@ -98,7 +65,7 @@ class RelitLight(FieldLight):
                     self._worker = None
                     return
             # From the bake's own field each time: only it has been measured, whatever the lamps did since.
-            self._deliver(self._relight, scene, self._progress)
+            self._deliver(self.relit, scene, self._progress)
             if self._refine is None:
                 continue
             with self._lock:
@@ -116,7 +83,7 @@ class RelitLight(FieldLight):
             result = field, self._tables_of(field)
         except Cancelled:
             return
-        except Exception as error:  # it belongs to who asks with `update`
-            result = error
+        except Exception as error:  # it belongs to who asks with `update`; its frames refer to it, and to this light
+            result = error.with_traceback(None)
         with self._lock:
             self._result = result
