@@ -24,8 +24,8 @@ from ..lattice.focus import focus, spacing_of
 from ..lattice.placement import Placement, place
 from .adaptive import FIRST_ROUND, SAMPLING_SHARE, ErrorModel
 from .gather import GROUP, RAYS_PER_LIGHT_SAMPLE, Gatherer, Item, gather
-from .memory import BYTES_PER_RAY, ray_bytes, working_bytes
-from .reach import texels_in_reach
+from .memory import BYTES_PER_HIT, ray_bytes, working_bytes
+from .reach import Reach, reach_of
 from .relight import MAX_KEPT_RAYS, HitMemory
 from .settings import ProbeSettings
 from .shares import TEXEL_COST, Shares
@@ -108,10 +108,10 @@ class ProbeBake:
             self.placement, self.cache, _ = block
         measured = self.placement.positions[self.placement.measured]
         if block is not None:
-            self._texels = self.cache.count
+            self._reach = Reach(self.cache.count, 1.0)
         else:
-            self._texels = texels_in_reach(context, self.cache.layout, measured, seed) if settings.bounces != 0 else 0
-        require_memory(working_bytes(self.cache, settings, self._texels, len(measured), BATCH_RAYS, MAX_KEPT_RAYS))
+            self._reach = reach_of(context, self.cache.layout, measured, seed) if settings.bounces != 0 else Reach(0, 1.0)
+        require_memory(working_bytes(self.cache, settings, self._reach, len(measured), BATCH_RAYS, MAX_KEPT_RAYS))
         self.gatherer = Gatherer(context, self.cache, self.placement, settings, seed)
         count = len(self.placement.positions)
         self.model = ErrorModel(count, sh.coefficient_count(settings.order), None if block is None else block.brightness)
@@ -141,7 +141,7 @@ class ProbeBake:
                     return
                 if self._round == len(self._rounds):
                     # Now the probes themselves have said how many they want.
-                    require_memory({"rays": ray_bytes(self._expected_rays(), BATCH_RAYS, MAX_KEPT_RAYS)})
+                    require_memory({"rays": ray_bytes(self._expected_rays(), self._reach.hits, BATCH_RAYS, MAX_KEPT_RAYS)})
                 self._next = 0
                 self._sums[:] = 0
             self._trace_round()
@@ -226,7 +226,7 @@ class ProbeBake:
             rate = (self.ray_count - before) / max(time.monotonic() - started, 1e-3)
             label = f"probe rays, {rate / 1e6:.1f} M/s" if rate else "probe rays"
             # The first batch meets nearly all texels that there will be, and in small bakes those are most of the work.
-            texels = max(self._texels, self.cache.count)
+            texels = max(self._reach.texels, self.cache.count)
             new = of_texel * (texels - self.cache.count)
             total = expected + of_texel * texels
             low = self.ray_count + of_texel * self.cache.count
@@ -238,7 +238,8 @@ class ProbeBake:
                 self._checkpoint.save(self._name, self._state())
 
     def _run_batch(self, batch: list[Item], label: str, progress: Progress, shares: Shares) -> None:
-        require_memory({"rays": BYTES_PER_RAY * sum(item.ray_count for item in batch)})
+        # All of them: a part of the probes may stand where more rays hit than elsewhere.
+        require_memory({"rays": BYTES_PER_HIT * sum(item.ray_count for item in batch)})
         for item, hits, texel, sums in zip(batch, *gather(self.gatherer, batch, progress, label, shares), strict=True):
             self._sums[sums.probes] += sums.sh
             self._distance[sums.probes] += sums.distance

@@ -28,7 +28,8 @@ from .block_field import BlockField, Bricks, Read
 from .captured import capturing, lamp_light_of
 from .gather import GROUP, Gatherer, gather
 from .gathering import items_of
-from .memory import BYTES_PER_RAY, working_bytes
+from .memory import BYTES_PER_HIT, working_bytes
+from .reach import Reach
 from .relight import MAX_KEPT_RAYS
 from .settings import ProbeSettings
 from .surface_error import POINTS, Truth, error_against, light_on_surfaces
@@ -65,10 +66,10 @@ class _Group:
         if settings.bounces != 0:
             rays = min(SCOUTS_OF_PROBE, max(64, SCOUTS // len(measured) // 64 * 64))
             probes = measured[::-(-len(measured) * rays // SCOUTS)]
-            require_memory(working_bytes(self.cache, settings, 0, len(probes), BATCH_RAYS, MAX_KEPT_RAYS))
+            require_memory(working_bytes(self.cache, settings, Reach(0, 1.0), len(probes), BATCH_RAYS, MAX_KEPT_RAYS))
             items, done = items_of(probes, GROUP, rays), 0
             for batch in batches(items):
-                require_memory({"rays": BYTES_PER_RAY * sum(item.ray_count for item in batch)})
+                require_memory({"rays": BYTES_PER_HIT * sum(item.ray_count for item in batch)})
                 span = progress.span(done / len(items), (done + len(batch)) / len(items))
                 traced = parallel_for(lambda i, batch=batch: gatherer.trace(batch[i]), len(batch), self.context.threads,
                                       span.span(0.0, 0.5), "what probes look at")

@@ -7,14 +7,16 @@ memory is asked for.
 
 import numpy as np
 
-from ...scene.memory import BYTES_PER_THREAD
 from ...transport.cache.surface_cache import SurfaceCache
 from ...transport.parallel import thread_count
 from .adaptive import FIRST_ROUND, SLOPE
+from .reach import Reach
 from .settings import ProbeSettings
 
-# A hit between tracing and shading; one that is kept for relighting.
-BYTES_PER_RAY, BYTES_PER_KEPT_RAY = 32, 7
+# A hit between tracing and shading; a ray that is kept for relighting.
+BYTES_PER_HIT, BYTES_PER_KEPT_RAY = 32, 7
+# Stack and temporaries of a thread: 2.3 to 2.7 MiB from one to eight of them in three samples, more where they all work at once.
+BYTES_PER_THREAD = 4 << 20
 # Where texels lie on a triangle.
 BYTES_PER_TRIANGLE = 190
 # More temporaries of a thread where lamps are chosen among many.
@@ -23,20 +25,21 @@ BYTES_OF_A_CHOICE = 20 << 20
 USUAL_RAYS, USUAL_ERROR = 2000, 0.01
 
 
-def working_bytes(cache: SurfaceCache, settings: ProbeSettings, texels: int, probes: int, batch_rays: int,
+def working_bytes(cache: SurfaceCache, settings: ProbeSettings, reach: Reach, probes: int, batch_rays: int,
                   most_kept: int) -> dict[str, int]:
-    """Bytes by what takes them for a bake of ``probes`` probes whose rays reach ``texels`` of the cache, that holds up to
+    """Bytes by what takes them for a bake of ``probes`` probes whose rays meet what ``reach`` says of the cache, that holds up to
     ``batch_rays`` rays at a time and keeps up to ``most_kept`` for relighting."""
     thread = BYTES_PER_THREAD + (BYTES_OF_A_CHOICE if cache.chooses_sources else 0)
     layout = BYTES_PER_TRIANGLE * cache.context.geometry.count
-    return {"the surface cache": layout + cache.bytes_of(texels), "threads": thread * thread_count(cache.context.threads),
-            "rays": ray_bytes(probes * expected_rays(settings), batch_rays, most_kept)}
+    return {"the surface cache": layout + cache.bytes_of(reach.texels), "threads": thread * thread_count(cache.context.threads),
+            "rays": ray_bytes(probes * expected_rays(settings), reach.hits, batch_rays, most_kept)}
 
 
-def ray_bytes(rays: float, batch_rays: int, most_kept: int) -> int:
-    """Bytes that ``rays`` in all take, of which up to ``batch_rays`` are held at a time and up to ``most_kept`` kept."""
+def ray_bytes(rays: float, hits: float, batch_rays: int, most_kept: int) -> int:
+    """Bytes that ``rays`` in all take, of which the share ``hits`` meets something, up to ``batch_rays`` are held at a time and up
+    to ``most_kept`` kept."""
     # A bake goes in rounds, of which the largest has about half of all rays.
-    return int(BYTES_PER_RAY * min(rays / 2, batch_rays) + BYTES_PER_KEPT_RAY * min(rays, most_kept))
+    return int(BYTES_PER_HIT * hits * min(rays / 2, batch_rays) + BYTES_PER_KEPT_RAY * min(rays, most_kept))
 
 
 def expected_rays(settings: ProbeSettings) -> float:

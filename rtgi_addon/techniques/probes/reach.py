@@ -9,6 +9,8 @@ about the same chance. Measured on four samples: 3, 5, 6 and, under the open sky
 are split (texel_table.py) count once: in a hall of columns there were three times as many.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ...numerics.sampling import about, cosine_hemisphere, hash_u32, sobol_owen, sphere_from_square
@@ -23,17 +25,27 @@ PATHS, REFLECTIONS = 1 << 14, 2
 _REACH = 0x7265
 
 
-def texels_in_reach(context: LightContext, layout: TexelLayout, points: np.ndarray, seed: int) -> int:
-    """About how many texels of ``layout`` the rays from ``points`` (n, 3) and all that those lead to will meet; no more than the
-    surfaces have. The same for any number of threads."""
+class Reach(NamedTuple):
+    """About how many ``texels`` rays will meet, and the share of the first of them that hit something."""
+
+    texels: int
+    hits: float
+
+
+def reach_of(context: LightContext, layout: TexelLayout, points: np.ndarray, seed: int) -> Reach:
+    """What the rays from ``points`` (n, 3), and all that those lead to, will meet of ``layout``: no more than the surfaces have.
+    The same for any number of threads."""
     if not len(points):
-        return 0
+        return Reach(0, 0.0)
     numbers = sobol_owen(PATHS, 2 * (REFLECTIONS + 1), hash_u32(seed, _REACH))
     origins = np.asarray(points, np.float32)[np.arange(PATHS) % len(points)]
     directions, slots = sphere_from_square(numbers[:, :2]).astype(np.float32), []
+    share = 0.0
     for bounce in range(REFLECTIONS + 1):
         hits = context.tracer.intersect(origins, directions)
         rows = np.flatnonzero(hits.primitive >= 0)
+        if bounce == 0:
+            share = len(rows) / PATHS
         if not rows.size:
             break
         primitive, u, v = hits.primitive[rows], hits.u[rows], hits.v[rows]
@@ -46,7 +58,7 @@ def texels_in_reach(context: LightContext, layout: TexelLayout, points: np.ndarr
         numbers = numbers[rows]
         directions = about(normals, cosine_hemisphere(numbers[:, 2 * bounce + 2:2 * bounce + 4])).astype(np.float32)
     if not slots:
-        return 0
+        return Reach(0, share)
     counts = np.unique(np.concatenate(slots), return_counts=True)[1]
     singles, doubles = int((counts == 1).sum()), int((counts == 2).sum())
-    return min(len(counts) + singles * (singles - 1) // (2 * (doubles + 1)), layout.likely_texels)
+    return Reach(min(len(counts) + singles * (singles - 1) // (2 * (doubles + 1)), layout.likely_texels), share)

@@ -26,7 +26,7 @@ from rtgi_addon.scene.memory import estimate_bytes
 from rtgi_addon.techniques import get
 from rtgi_addon.techniques.probes.bake import BATCH_RAYS, MAX_KEPT_RAYS, surface_cache
 from rtgi_addon.techniques.probes.memory import working_bytes
-from rtgi_addon.techniques.probes.reach import texels_in_reach
+from rtgi_addon.techniques.probes.reach import reach_of
 from rtgi_addon.transport.context import LightContext
 
 def resident(name):
@@ -41,8 +41,8 @@ technique.bake(scene, settings, np.random.default_rng(0), Progress(), threads=2)
 peak = resident("VmHWM") - before
 context = LightContext(scene, 2)
 cache, centre = surface_cache(context, scene.volumes, settings, 0), np.zeros((1, 3), np.float32)
-texels = texels_in_reach(context, cache.layout, centre, 0)
-needs = estimate_bytes(scene, 2) | working_bytes(cache, settings, texels, 64, BATCH_RAYS, MAX_KEPT_RAYS)
+reach = reach_of(context, cache.layout, centre, 0)
+needs = estimate_bytes(scene, 2) | working_bytes(cache, settings, reach, 64, BATCH_RAYS, MAX_KEPT_RAYS)
 print(peak, sum(needs.values()))
 """
 

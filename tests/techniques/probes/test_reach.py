@@ -8,7 +8,7 @@ import scene_builders as build
 from rtgi_addon.progress import Progress
 from rtgi_addon.techniques import get
 from rtgi_addon.techniques.probes.bake import surface_cache
-from rtgi_addon.techniques.probes.reach import texels_in_reach
+from rtgi_addon.techniques.probes.reach import reach_of
 from rtgi_addon.transport.context import LightContext
 
 # A room with a volume in it, and the same with another room of twice its side beside it, which no ray gets into.
@@ -26,7 +26,7 @@ def test_it_is_what_a_bake_reaches_and_nothing_out_of_sight(meshes):
     settings = technique.Settings(rays=2048, texel_size=0.05)
     context = LightContext(scene, 1)
     layout = surface_cache(context, scene.volumes, settings, 0).layout
-    found = texels_in_reach(context, layout, np.zeros((1, 3), np.float32), 0)
+    found = reach_of(context, layout, np.zeros((1, 3), np.float32), 0).texels
     baked = technique.bake(scene, settings, np.random.default_rng(0), Progress(), threads=1).stats["texels"]
     assert 0.85 * baked < found < 1.15 * baked
     assert len(meshes) == 1 or found < 0.7 * layout.likely_texels
@@ -37,14 +37,14 @@ def test_it_is_the_same_for_any_number_of_threads_and_no_more_than_there_is():
     context = LightContext(scene, 1)
     layout = surface_cache(context, scene.volumes, get("probes").Settings(texel_size=0.5), 0).layout
     centre = np.zeros((1, 3), np.float32)
-    found = texels_in_reach(context, layout, centre, 0)
-    assert found == texels_in_reach(LightContext(scene, 2), layout, centre, 0) <= layout.likely_texels
-    assert found > 50
+    found = reach_of(context, layout, centre, 0)
+    assert found == reach_of(LightContext(scene, 2), layout, centre, 0) and found.texels <= layout.likely_texels
+    assert found.texels > 50 and found.hits == 1.0
 
 
 def test_nothing_is_reached_from_nowhere_and_in_the_open():
     scene = scene_of(build.plane(half_size=1.0, z=-50.0))
     context = LightContext(scene, 1)
     layout = surface_cache(context, scene.volumes, get("probes").Settings(), 0).layout
-    assert texels_in_reach(context, layout, np.zeros((0, 3), np.float32), 0) == 0
-    assert texels_in_reach(context, layout, np.array([[0.0, 0.0, 1e6]], np.float32), 0) == 0
+    assert reach_of(context, layout, np.zeros((0, 3), np.float32), 0) == (0, 0.0)
+    assert reach_of(context, layout, np.array([[0.0, 0.0, 1e6]], np.float32), 0) == (0, 0.0)
