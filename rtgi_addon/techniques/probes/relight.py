@@ -8,7 +8,7 @@ import numpy as np
 from ...errors import BakeError
 from ...progress import Progress
 from ...scene import Scene
-from ...transport.cache.relighting import relit_cache
+from ...transport.cache.relighting import relit_cache, thought_to_receive
 from ...transport.cache.surface_cache import SurfaceCache
 from ...transport.context import LightContext
 from ...transport.parallel import parallel_for
@@ -96,7 +96,9 @@ def relight(bake, scene: Scene, lamp_light: LampLight, progress: Progress) -> Re
     bake.memory.require()
     context = bake.context.relit(scene)
     cache = relit_cache(bake.cache, context, progress.span(0.0, CACHE_LIT))
-    cache.solve(bake.settings.bounces, SOLVER_SHARE * bake.settings.target, progress.span(CACHE_LIT, CACHE_SOLVED), bright=False)
+    start = thought_to_receive(cache, bake.cache) if bake.cache.solved == cache.count else None
+    cache.solve(bake.settings.bounces, SOLVER_SHARE * bake.settings.target, progress.span(CACHE_LIT, CACHE_SOLVED), bright=False,
+                start=start)
     gatherer = bake.gatherer.under(context, cache)
     sums = relit_sums(bake.memory, gatherer, np.zeros_like(bake.model.total), bake.emitted, progress.span(CACHE_SOLVED, 1.0))
     coefficients = sums / np.maximum(bake.model.rays, 1)[:, None, None]

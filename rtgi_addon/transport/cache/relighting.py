@@ -12,6 +12,9 @@ from .surface_cache import SurfaceCache, Traced
 from .texel_light import ALL_SOURCES
 from .texel_rows import TexelRows
 
+# What was received before counts up to so many times: of next to nothing that was lit, nothing is to be learnt.
+_MOST_BRIGHTER = 1e3
+
 
 def relit_cache(cache: SurfaceCache, context: LightContext, progress: Progress) -> SurfaceCache:
     """The same texels and hits as in ``cache`` under the lamps and world of ``context``, for ``solve`` with ``bright`` False.
@@ -33,6 +36,8 @@ def relit_cache(cache: SurfaceCache, context: LightContext, progress: Progress) 
         if world_changed:
             sky = other.sky_again(slots, surface, i)
         limited = other.light.limited(slots, surface)
+        if other.sources.count <= ALL_SOURCES:
+            return sky, other.light.mean(range(other.sources.count), slots, surface), limited
         if not few:
             return sky, other.light.direct(slots, surface).irradiance, limited
         direct = rows.irradiance_direct[texels] + other.light.mean(came, slots, surface)
@@ -44,3 +49,13 @@ def relit_cache(cache: SurfaceCache, context: LightContext, progress: Progress) 
     sky, direct, limited = (np.concatenate([*(part[column] for part in parts), last]) for column, last in enumerate(lasts))
     other.rows = replace(rows, irradiance_sky=sky, irradiance_direct=direct, irradiance_limited=limited)
     return other
+
+
+def thought_to_receive(cache: SurfaceCache, before: SurfaceCache) -> np.ndarray:
+    """What the texels of ``cache`` may receive (n + 1, 3) from one another, by what they received in ``before``, which is solved:
+    as much more as leaves all of them together."""
+    fixed, known = (own.rows.irradiance_sky + own.rows.irradiance_emission for own in (cache, before))
+    now, then = (np.abs(own.rows.leaving(light + own.rows.irradiance_direct)).sum(axis=0, dtype=np.float64)
+                 for own, light in ((cache, fixed), (before, known)))
+    share = np.minimum(now / np.maximum(then, 1e-30), _MOST_BRIGHTER)
+    return np.maximum(before.irradiance_rest - known, 0) * share.astype(np.float32)

@@ -19,7 +19,7 @@ _REGULARISED = 1e-10
 
 def solve_radiosity(form_factors: FormFactors, source: np.ndarray, first_bounce: np.ndarray, rows: TexelRows,
                     by_angle: np.ndarray, bounces: int | None, tolerance: float, threads: int | None, progress: Progress,
-                    known: np.ndarray | None = None) -> np.ndarray:
+                    known: np.ndarray | None = None, start: np.ndarray | None = None) -> np.ndarray:
     """Irradiance (n + 1, 3) that texels receive from one another.
 
     ``source`` (n + 1, 3) is the irradiance from elsewhere that is reflected in here; ``first_bounce`` (n + 1, 3) is what texels
@@ -29,7 +29,9 @@ def solve_radiosity(form_factors: FormFactors, source: np.ndarray, first_bounce:
     passes; None iterates until the largest relative change falls below ``tolerance``, with Anderson's extrapolation
     (Walker and Ni 2011, "Anderson acceleration for fixed-point iterations"), which changes the path, not the limit. ``known``
     (k, 3) is what the first texels received in an earlier solution with fewer of them, which stands (None, and wherever bounces
-    are counted: all are solved): what a texel sees was brought into use with it, so none of them sees a later one.
+    are counted: all are solved): what a texel sees was brought into use with it, so none of them sees a later one. ``start``
+    (n + 1, 3) is what they are thought to receive, where bounces are not counted: the nearer, the fewer passes (None: the first
+    bounce).
     """
     fixed = 0 if known is None or bounces is not None else len(known)
     spans = form_factors.spans()
@@ -62,6 +64,8 @@ def solve_radiosity(form_factors: FormFactors, source: np.ndarray, first_bounce:
         irradiance[fixed:] = source[fixed:] + received[fixed:]
         return leaving(irradiance)
 
+    if start is not None and bounces is None:
+        received[:] = start
     if fixed:
         received[:fixed] = known
     # Starting from the first bounce saves a pass where all are wanted; a counted series starts from nothing.

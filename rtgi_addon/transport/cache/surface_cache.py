@@ -314,11 +314,13 @@ class SurfaceCache:
                                             (surface.shading, surface.face))
         return irradiance.reshape(m, n, 3).sum(axis=0)
 
-    def solve(self, bounces: int | None, tolerance: float, progress: Progress, bright: bool = True) -> None:
+    def solve(self, bounces: int | None, tolerance: float, progress: Progress, bright: bool = True,
+              start: np.ndarray | None = None) -> None:
         """Spread light between texels: ``bounces`` reflections in all (None: until the change is below ``tolerance``).
 
         A probe's own look at a surface is one reflection, so ``bounces`` − 1 of them happen here. ``bright`` False leaves brightly
-        lit surfaces to the rays that hit them, which costs no further ray and gives more noise.
+        lit surfaces to the rays that hit them, which costs no further ray and gives more noise. ``start`` (n + 1, 3) is what texels
+        are thought to receive from one another: the nearer, the sooner.
         """
         if self.solved == self.count:
             return
@@ -328,8 +330,14 @@ class SurfaceCache:
                                       self._light_at, self.numbers.seed)
             self.first_bounce = self._no_bounce()
         self.bright.cover(self.table.slots)
-        self.first_bounce = self._gather_first_bounce(progress)
         fixed = self.rows.irradiance_sky + self.rows.irradiance_emission
+        if start is not None and bounces is None and not self.bright.count and not self.light.limits:
+            # What lamps light directly goes the same way as all other light, and needs no pass of its own.
+            lit = fixed + self.rows.irradiance_direct
+            self.irradiance_rest = fixed + self._spread(lit, np.zeros_like(fixed), None, tolerance, progress, start=start)
+            self.solved = self.count
+            return
+        self.first_bounce = self._gather_first_bounce(progress)
         unlimited, *limited = np.split(self.first_bounce, 1 + len(self.light.limits), axis=1)
         # A later round adds few texels: what the others received is where to go on from.
         known = None if limited or not self.solved else self.irradiance_rest[:self.solved] - fixed[:self.solved]
@@ -339,11 +347,11 @@ class SurfaceCache:
             self.irradiance_rest += self._spread(np.zeros_like(fixed), first_bounce, most, tolerance, progress)
         self.solved = self.count
 
-    def _spread(self, fixed, first_bounce, bounces, tolerance, progress, known=None) -> np.ndarray:
+    def _spread(self, fixed, first_bounce, bounces, tolerance, progress, known=None, start=None) -> np.ndarray:
         first_bounce = np.ascontiguousarray(first_bounce)
         angles = self.context.surfaces.albedo_by_angle.table
         return solve_radiosity(self.form_factors, fixed, first_bounce, self.rows, angles, bounces, tolerance, self.context.threads,
-                               progress, known)
+                               progress, known, start)
 
     def _no_bounce(self) -> np.ndarray:
         return np.zeros((1, 3 * (1 + len(self.light.limits))), np.float32)

@@ -129,6 +129,19 @@ def test_many_bounces_reach_the_limit():
     np.testing.assert_allclose(solve(system, 200), solve(system), rtol=1e-5)
 
 
+def test_where_it_starts_changes_the_way_and_not_the_end():
+    system = random_system()
+    blocks, source, first, albedo, _ = system
+    expected, steps = exact(system), []
+    near = np.append(1.02 * expected, np.zeros((1, 3)), axis=0).astype(np.float32)
+    for start in (None, near, np.random.default_rng(3).random(source.shape).astype(np.float32) * 5):
+        steps.append([])
+        progress = Progress(lambda *said: steps[-1].append(said), interval=0.0)
+        found = solve_radiosity(factors(blocks), source, first, reflecting(albedo), ONES, None, 1e-6, 1, progress, start=start)
+        np.testing.assert_allclose(found[:-1], expected, rtol=2e-5)
+    assert len(steps[1]) < len(steps[0])
+
+
 def test_threads_do_not_change_a_bit():
     system = random_system(n=200, seed=3)
     results = {solve(system, threads=threads).tobytes() for threads in (1, 2, 5)}
