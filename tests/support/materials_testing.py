@@ -222,3 +222,22 @@ def random_image(name="picture", width=8, height=6, seed=1, alpha=False, float_b
 def names_in_file():
     """Every datablock's name by kind: what a fallback must leave as it was."""
     return {kind: sorted(item.name for item in getattr(bpy.data, kind)) for kind in DATA}
+
+
+def only(material):
+    """The one material of a grid, read from its nodes."""
+    (read,), *_ = read_object(grid_object(material))
+    assert read.extraction == "nodes"
+    return read
+
+
+def closures(*nodes):
+    """A material whose tree has these (kind, {input: value}) nodes; returns it with them and its output."""
+    material, output = new_material()
+    made = []
+    for kind, inputs in nodes:
+        node = material.node_tree.nodes.new(kind)
+        for name, value in inputs.items():
+            node.inputs[name].default_value = value
+        made.append(node)
+    return material, made, output

@@ -115,17 +115,21 @@ class ShaderReader:
         roughness, ior = self._number(node, "Roughness", path, _DEFAULT_ROUGHNESS), self._number(node, "IOR", path, _DEFAULT_IOR)
         # A level of a half is what the index of refraction says.
         f0 = albedo.reflectance_from_ior(ior) * 2.0 * self._number(node, "Specular IOR Level", path, _DEFAULT_LEVEL)
-        normal_reflectance = f0 * np.clip(self._tint(node, path), 0.0, 1.0)
+        edge = np.maximum(self._mean_color(node, "Specular Tint", path), 0.0)
+        normal_reflectance = np.minimum(f0 * edge, 1.0)
         specular = albedo.dielectric_specular(roughness, normal_reflectance)
+        # What a layer leaves of what lies under it is grey in Cycles, by the colour that it reflects most of.
+        left = 1.0 - float(specular.max())
         multiple = node.distribution == "MULTI_GGX"
-        self._shape_of_reflection(node, self._number(node, "Diffuse Roughness", path))
+        even = self._rough(node, base, self._number(node, "Diffuse Roughness", path))
+        self._say_of_gloss(node, path)
 
         wall = self._number(node, "Thin Wall", path) > 0.5
         through = self._through(node, path) if wall else 0.0
         if not wall and self._number(node, "Subsurface Weight", path) > 0.0:
             self._spread(node, "Subsurface ", path)
-        reflected = base * ((1.0 - through) * (1.0 - specular)) + Value.of(specular)
-        translucency = base * (through * (1.0 - specular))
+        reflected = even * ((1.0 - through) * left) + Value.of(specular)
+        translucency = base * (through * left)
         covered, tint = _WHITE, _WHITE
         if not transmission.equals(0.0):
             covered, tint, glass = self._glassy(base, specular, ior, wall)
@@ -133,10 +137,20 @@ class ShaderReader:
             reflected = reflected * (1.0 - transmission) + transmission * glass
             translucency = translucency * (1.0 - transmission)
         if not metallic.equals(0.0):
-            conductor = apply(lambda color: albedo.metal(color, roughness, multiple), base)
+            conductor = apply(lambda color: albedo.metal(color, roughness, multiple, edge), base)
             reflected = reflected * (1.0 - metallic) + conductor * metallic
             translucency = translucency * (1.0 - metallic)
         emission = self._input(node, "Emission Color", path) * self._input(node, "Emission Strength", path)
+        coat = self._number(node, "Coat Weight", path)
+        if coat > 0.0:
+            index = self._number(node, "Coat IOR", path, _DEFAULT_IOR)
+            f0 = albedo.reflectance_from_ior(index)
+            gloss = coat * albedo.dielectric_specular(self._number(node, "Coat Roughness", path), f0)
+            stain = albedo.through_coat(np.clip(self._mean_color(node, "Coat Tint", path), 0.0, 1.0), index)
+            left = (1.0 - gloss) * (1.0 - coat * (1.0 - stain))
+            reflected, emission, translucency = reflected * left + Value.of(gloss), emission * left, translucency * left
+            covered = 1.0 - (1.0 - covered) * float(left.mean())
+            tint = tint * (left / left.mean())
         weight = self._number(node, "Sheen Weight", path)
         if weight > 0.0:
             cover = np.clip(self._mean_color(node, "Sheen Tint", path), 0.0, 1.0)
@@ -144,12 +158,6 @@ class ShaderReader:
             left = 1.0 - float(sheen.max())
             reflected, emission, translucency = reflected * left + Value.of(sheen), emission * left, translucency * left
             covered = 1.0 - (1.0 - covered) * left
-        coat = self._number(node, "Coat Weight", path)
-        if coat > 0.0:
-            f0 = albedo.reflectance_from_ior(self._number(node, "Coat IOR", path, _DEFAULT_IOR))
-            gloss = coat * albedo.dielectric_specular(self._number(node, "Coat Roughness", path), f0)
-            reflected, emission = reflected * (1.0 - gloss) + Value.of(gloss), emission * (1.0 - gloss)
-            translucency, covered = translucency * (1.0 - gloss), 1.0 - (1.0 - covered) * (1.0 - float(gloss.mean()))
         alpha = covered * self._input(node, "Alpha", path, 1.0).clamped()
         if alpha is not covered and not tint.equals(1.0):
             whole = self._input(node, "Alpha", path, 1.0).clamped()
@@ -181,9 +189,6 @@ class ShaderReader:
         inside = self._nodes.ray.back if ior >= 1.0 else not self._nodes.ray.back
         return albedo.inside_reflectance(specular, ior) if inside else specular
 
-    def _tint(self, node, path: tuple) -> np.ndarray:
-        return self._mean_color(node, "Specular Tint", path)
-
     def _mean_color(self, node, name: str, path: tuple) -> np.ndarray:
         try:
             return self._input(node, name, path, 1.0).mean()
@@ -192,13 +197,12 @@ class ShaderReader:
 
     def _diffuse(self, node, path: tuple) -> Surface:
         color = self._input(node, "Color", path)
-        if node.bl_idname == "ShaderNodeBsdfDiffuse":
-            self._shape_of_reflection(node, self._number(node, "Roughness", path))
-        return Surface(color, base_color=color)
+        return Surface(self._rough(node, color, self._number(node, "Roughness", path)), base_color=color)
 
     def _subsurface(self, node, path: tuple) -> Surface:
         self._spread(node, "", path)
-        return self._diffuse(node, path)
+        color = self._input(node, "Color", path)
+        return Surface(color, base_color=color)
 
     def _spread(self, node, prefix: str, path: tuple) -> None:
         """Say how far light goes beneath the surface in Cycles. Its colour is what leaves one that is flat and thick."""
@@ -206,12 +210,25 @@ class ShaderReader:
         if reach > 0.0:
             self._remark(f"the light that goes some {reach:.2g} m beneath its surface leaves it where it entered")
 
-    def _shape_of_reflection(self, node, roughness: float) -> None:
-        """Say what bends diffuse reflection in Cycles and not here; the reflected flux is right all the same."""
-        if roughness > 0.0:
-            self._remark("its rough diffuse reflection (Oren-Nayar) is treated as even in all directions")
+    def _rough(self, node, color: Value, roughness: float) -> Value:
+        """Albedo of rough diffuse reflection of ``color``. Says what bends diffuse reflection in Cycles and not here; the reflected
+        flux is right all the same."""
         if node.inputs["Normal"].is_linked:
             self._remark("its bumps are left out")
+        if roughness <= 0.0:
+            return color
+        self._remark("its rough diffuse reflection (Oren-Nayar) is treated as even in all directions")
+        try:
+            return apply(lambda colors: albedo.rough_diffuse(colors, roughness), color)
+        except Unreadable:  # an attribute: as much less as grey loses
+            return color * float(2.0 * albedo.rough_diffuse(np.float32(0.5), roughness))
+
+    def _say_of_gloss(self, node, path: tuple) -> None:
+        """Say what of a glossy layer's or a metal's reflection is left out."""
+        if any(self._number(node, name, path) > 0.0 for name in ("Anisotropic", "Anisotropy")):
+            self._remark("its anisotropic reflection is taken as that of even roughness")
+        if self._number(node, "Thin Film Thickness", path) > 0.0:
+            self._remark("the colours of its thin film are left out")
 
     def _toon(self, node, path: tuple) -> Surface:
         self._remark("its light and dark are evened out: it reflects as much of even light as in Cycles")
@@ -225,26 +242,29 @@ class ShaderReader:
                        base_color=color)
 
     def _translucent(self, node, path: tuple) -> Surface:
-        color = self._input(node, "Color", path)
-        self._shape_of_reflection(node, 0.0)
+        color = self._rough(node, self._input(node, "Color", path), 0.0)
         return Surface(base_color=color, translucency=color)
 
     def _glossy(self, node, path: tuple) -> Surface:
         color, roughness = self._input(node, "Color", path), self._number(node, "Roughness", path, _DEFAULT_ROUGHNESS)
         multiple = node.distribution == "MULTI_GGX"
-        reflected = apply(lambda color: albedo.metal(color, roughness, multiple, edge=False), color)
+        self._say_of_gloss(node, path)
+        reflected = apply(lambda color: albedo.metal(color, roughness, multiple, None), color)
         return Surface(reflected, base_color=color, metallic=_WHITE,
                        roughness=self._preview(node, "Roughness", path, _DEFAULT_ROUGHNESS))
 
     def _metallic(self, node, path: tuple) -> Surface:
+        self._say_of_gloss(node, path)
+        roughness, multiple = self._number(node, "Roughness", path, _DEFAULT_ROUGHNESS), node.distribution == "MULTI_GGX"
         if node.fresnel_type == "PHYSICAL_CONDUCTOR":
             # The complex index n + ik.
-            index, extinction = self._input(node, "IOR", path), self._input(node, "Extinction", path)
-            color = apply(lambda n, k: ((n - 1) ** 2 + k**2) / np.maximum((n + 1) ** 2 + k**2, 1e-9), index, extinction)
+            index = self._input(node, "IOR", path), self._input(node, "Extinction", path)
+            color = apply(lambda n, k: albedo.conductor_fresnel(n, k, 1.0), *index)
+            reflected = apply(lambda n, k: albedo.conductor(n, k, roughness, multiple), *index)
         else:
-            color = self._input(node, "Base Color", path)
-        roughness, multiple = self._number(node, "Roughness", path, _DEFAULT_ROUGHNESS), node.distribution == "MULTI_GGX"
-        return Surface(apply(lambda color: albedo.metal(color, roughness, multiple), color), base_color=color, metallic=_WHITE,
+            color, edge = self._input(node, "Base Color", path), np.clip(self._mean_color(node, "Edge Tint", path), 0.0, 1.0)
+            reflected = apply(lambda color: albedo.metal(color, roughness, multiple, edge), color)
+        return Surface(reflected, base_color=color, metallic=_WHITE,
                        roughness=self._preview(node, "Roughness", path, _DEFAULT_ROUGHNESS))
 
     def _glass(self, node, path: tuple) -> Surface:

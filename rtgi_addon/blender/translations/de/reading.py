@@ -19,6 +19,9 @@ READING: dict[str, str] = {
         "für {0} gibt es hier keine Formel: es gilt die Farbe, die Cycles als diffuse davon backt, und die kann schwarz sein",
     "the light that goes some {0} m beneath its surface leaves it where it entered":
         "das Licht, das etwa {0} m unter die Oberfläche geht, verlässt sie, wo es eintrat",
+    "its anisotropic reflection is taken as that of even roughness":
+        "seine anisotrope Spiegelung gilt als die gleichmäßiger Rauheit",
+    "the colours of its thin film are left out": "die Farben seines dünnen Films bleiben weg",
     "lamp {0} lights linked objects alone, and probes give its direct light to all":
         "Lampe {0} beleuchtet nur verknüpfte Objekte, und Sonden geben ihr direktes Licht allen",
     "transfer bakes all volumes with the same settings: those of volume {0} are not followed":
