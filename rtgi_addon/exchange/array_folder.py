@@ -15,7 +15,7 @@ import numpy as np
 from ..errors import BakeError
 from ..storage.array_file import ARRAY_INDEX, read_arrays, write_arrays
 from ..storage.files import disk_error
-from ..storage.inventory import BYSTANDERS, Stranger, first_stranger
+from ..storage.owned import owned
 from ..storage.parse import Check, digest, file_name, parse_document, record, require_inside, table, text
 from ..storage.paths import check_output
 from ..storage.reading import read_file, sha256_of_file
@@ -68,25 +68,7 @@ def check_folder_target(kind: Kind, out, *, inputs=()) -> Path:
 def ours(kind: Kind, path: Path, contents: bool = True) -> dict[str, str]:
     """What of the folder ``path`` is of a folder of ``kind`` (name → checksum), which must be all of it; ``contents`` also compares
     checksums. Raises BakeError for anything else that is there."""
-    try:
-        if not path.is_dir():
-            return {}
-        if not (path / kind.document).is_file():
-            ours = {}
-            stranger = next((item.name for item in sorted(path.iterdir()) if item.name not in BYSTANDERS), None)
-        else:
-            ours = {**_document(kind, path)[0]["sha256"], kind.document: sha256_of_file(path / kind.document)}
-            stranger = first_stranger(path, ours, contents)
-    except OSError as error:
-        raise disk_error(path, error) from error
-    if isinstance(stranger, Stranger) and stranger.changed:
-        raise BakeError(f"{path} holds {stranger.name}, which was changed since it was written",
-                        "choose another --out, or move that folder away")
-    if stranger is not None:
-        name = stranger.name if isinstance(stranger, Stranger) else stranger
-        raise BakeError(f"{path} holds {name}, which is not part of {kind.word}",
-                        "choose another --out, or move that away: the whole folder is replaced")
-    return ours
+    return owned(path, kind.document, lambda: _document(kind, path)[0]["sha256"], kind.word, "written", contents)
 
 
 def write_folder(kind: Kind, place: Workplace, document: dict, files: Mapping[str, Mapping[str, np.ndarray]]) -> Path:

@@ -20,7 +20,7 @@ from ..progress import Progress
 from ..scene import Medium, ProbeVolume, Scene
 from ..scene.scattered import named, of_grid
 from ..storage.files import disk_error
-from ..storage.inventory import BYSTANDERS, Stranger, first_stranger
+from ..storage.owned import owned
 from ..storage.parse import require_inside
 from ..storage.paths import check_output, resolved
 from ..storage.reading import open_file, read_file, sha256_of_file
@@ -126,25 +126,7 @@ def replaceable(path: Path, contents: bool = True) -> dict[str, str]:
 
     Raises BakeError for anything that is not of a bundle, that was changed since it was written, or that cannot be read.
     """
-    try:
-        if not path.is_dir():
-            return {}
-        if not (path / MANIFEST).is_file():
-            stranger = next((item.name for item in sorted(path.iterdir()) if item.name not in BYSTANDERS), None)
-            ours = {}
-        else:
-            ours = {**_manifest_to_replace(path)["sha256"], MANIFEST: sha256_of_file(path / MANIFEST)}
-            stranger = first_stranger(path, ours, contents)
-    except OSError as error:
-        raise disk_error(path, error) from error
-    if isinstance(stranger, Stranger) and stranger.changed:
-        raise BakeError(f"{path} holds {stranger.name}, which was changed since it was baked",
-                        "choose another --out, or move that folder away")
-    if stranger is not None:
-        name = stranger.name if isinstance(stranger, Stranger) else stranger
-        raise BakeError(f"{path} holds {name}, which is not part of a bundle",
-                        "choose another --out, or move that away: the whole folder is replaced")
-    return ours
+    return owned(path, MANIFEST, lambda: _manifest_to_replace(path)["sha256"], "a bundle", "baked", contents)
 
 
 def _manifest_to_replace(path: Path) -> dict:

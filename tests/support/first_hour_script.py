@@ -6,16 +6,17 @@ overlays are looked at in another engine. What it saw goes to REPORT as JSON, sc
 """
 
 import importlib
-import json
 import sys
-import traceback
 from pathlib import Path
 
 import bpy
 
+sys.path.insert(0, str(Path(__file__).parent))
+from window_driver import area, in_view, region, run, screenshot, window
+
 REPORT, ADDON = sys.argv[sys.argv.index("--") + 1:][:2]
 FOLDER = Path(REPORT).parent
-seen = {"error": "did not finish"}
+seen = {}
 
 
 def module(name):
@@ -25,25 +26,8 @@ def module(name):
 session = module("session").session
 
 
-def window():
-    return bpy.context.window_manager.windows[0]
-
-
 def scene():
     return window().scene
-
-
-def area(kind):
-    return next(found for found in window().screen.areas if found.type == kind)
-
-
-def region(kind, name):
-    return next(found for found in area(kind).regions if found.type == name)
-
-
-def in_view():
-    """A context as a button in the 3D view has it."""
-    return bpy.context.temp_override(window=window(), area=area("VIEW_3D"), region=region("VIEW_3D", "WINDOW"))
 
 
 def press(name, **options):
@@ -61,7 +45,7 @@ def until(done, seconds=120.0, step=0.1):
 
 
 def picture(name):
-    bpy.ops.screen.screenshot(filepath=str(FOLDER / f"{name}.png"))
+    screenshot(FOLDER / f"{name}.png")
 
 
 def pixels(name):
@@ -144,7 +128,7 @@ def reopened():
     yield from bake()
     baked = scene().rtgi.last_bake.probes
     bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False)
-    yield 1.5
+    yield from until(lambda: scene().name in session.stale)
     last = scene().rtgi.last_bake
     seen["found"] = {"folder": last.folder, "probes": last.probes, "baked": baked, "stale": session.stale.get(scene().name)}
 
@@ -207,22 +191,4 @@ def story():
     yield from exported()
 
 
-def run(steps):
-    """Let Blender's timer drive the story; whatever happens, write the report and quit."""
-    def tick():
-        try:
-            return next(steps)
-        except StopIteration:
-            del seen["error"]
-        except BaseException:
-            seen["error"] = traceback.format_exc()
-        Path(REPORT).write_text(json.dumps(seen))
-        bpy.ops.wm.quit_blender()
-        return None
-
-    bpy.app.timers.register(tick, first_interval=1.0, persistent=True)
-
-
-bpy.context.preferences.view.show_splash = False
-bpy.context.preferences.use_preferences_save = False
-run(story())
+run(story(), seen, REPORT)

@@ -6,37 +6,23 @@ It opens FILE; what it saw goes to REPORT as JSON, screenshots to the folder bes
 
 import gc
 import importlib
-import json
 import sys
-import traceback
 from pathlib import Path
 
 import addon_utils
 import bpy
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).parent))
+from window_driver import area, in_view, run, screenshot, window
+
 FILE, REPORT, ADDON = sys.argv[sys.argv.index("--") + 1:][:3]
 FOLDER = Path(REPORT).parent
 STEP, PATIENCE = 0.1, 30.0
 
-seen = {"error": "did not finish"}
+seen = {}
 module = importlib.import_module(f"{ADDON}.blender.session")
 live = importlib.import_module(f"{ADDON}.blender.engine.live")
-
-
-def window():
-    return bpy.context.window_manager.windows[0]
-
-
-def area(kind):
-    return next(found for found in window().screen.areas if found.type == kind)
-
-
-def in_view():
-    """A context as a button in the 3D view has it."""
-    view = area("VIEW_3D")
-    region = next(part for part in view.regions if part.type == "WINDOW")
-    return bpy.context.temp_override(window=window(), area=view, region=region)
 
 
 def until(done):
@@ -55,7 +41,7 @@ def until(done):
 def picture(name):
     """The 3D view's pixels (h, w, 3), row 0 at the bottom, as the screen shows them; the whole window is kept as a file."""
     path = FOLDER / f"{name}.png"
-    bpy.ops.screen.screenshot(filepath=str(path))
+    screenshot(path)
     image = bpy.data.images.load(str(path))
     pixels = np.array(image.pixels, np.float32).reshape(image.size[1], image.size[0], -1)[..., :3]
     bpy.data.images.remove(image)
@@ -211,22 +197,4 @@ def story():
     seen["viewports left"] = sum(found.picture.renderer is not None for found in live_viewports())
 
 
-def run(steps):
-    """Let Blender's timer drive the story; whatever happens, write the report and quit."""
-    def tick():
-        try:
-            return next(steps)
-        except StopIteration:
-            del seen["error"]
-        except BaseException:
-            seen["error"] = traceback.format_exc()
-        Path(REPORT).write_text(json.dumps(seen))
-        bpy.ops.wm.quit_blender()
-        return None
-
-    bpy.app.timers.register(tick, first_interval=1.0, persistent=True)
-
-
-bpy.context.preferences.view.show_splash = False
-bpy.context.preferences.use_preferences_save = False
-run(story())
+run(story(), seen, REPORT)

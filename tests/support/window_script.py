@@ -7,42 +7,26 @@ wait, Blender's timer resumes it: the window runs on in between.
 
 import hashlib
 import importlib
-import json
 import sys
-import traceback
 from pathlib import Path
 
 import bpy
+
+sys.path.insert(0, str(Path(__file__).parent))
+from window_driver import area, in_view, region, run, screenshot, window
 
 FILE, REPORT, ADDON = sys.argv[sys.argv.index("--") + 1:][:3]
 FOLDER = Path(REPORT).parent
 OUT = FOLDER / "bake"
 LONG, SHORT = 1 << 18, 64  # rays per probe: long enough to be interrupted, short enough to wait for
 
-seen = {"error": "did not finish"}
+seen = {}
 module = importlib.import_module(f"{ADDON}.blender.session")
 wording = importlib.import_module(f"{ADDON}.blender.ui.progress_text")
 
 
 def session():
     return module.session
-
-
-def window():
-    return bpy.context.window_manager.windows[0]
-
-
-def area(kind):
-    return next(found for found in window().screen.areas if found.type == kind)
-
-
-def region(kind, name):
-    return next(found for found in area(kind).regions if found.type == name)
-
-
-def in_view():
-    """A context as a button in the 3D view has it."""
-    return bpy.context.temp_override(window=window(), area=area("VIEW_3D"), region=region("VIEW_3D", "WINDOW"))
 
 
 def settings(rays):
@@ -75,7 +59,7 @@ def ended():
 
 
 def picture(name):
-    bpy.ops.screen.screenshot(filepath=str(FOLDER / f"{name}.png"))
+    screenshot(FOLDER / f"{name}.png")
 
 
 def open_scene():
@@ -254,22 +238,4 @@ def story():
     picture("volume")
 
 
-def run(steps):
-    """Let Blender's timer drive the story; whatever happens, write the report and quit."""
-    def tick():
-        try:
-            return next(steps)
-        except StopIteration:
-            del seen["error"]
-        except BaseException:
-            seen["error"] = traceback.format_exc()
-        Path(REPORT).write_text(json.dumps(seen))
-        bpy.ops.wm.quit_blender()
-        return None
-
-    bpy.app.timers.register(tick, first_interval=1.0, persistent=True)
-
-
-bpy.context.preferences.view.show_splash = False
-bpy.context.preferences.use_preferences_save = False
-run(story())
+run(story(), seen, REPORT)
