@@ -18,7 +18,7 @@ from ...transport.voxels import VoxelGrid, Voxels, cones, rays
 from ...transport.voxels.cones import cone_set
 from ...transport.voxels.hierarchy import build_hierarchy
 from ...transport.voxels.tables import pack, row_numbers
-from ...transport.voxels.voxelize import Seen
+from ...transport.voxels.voxelize import NO_PLATE, Seen
 from ..voxel_files import lists_of
 from .axes import Axes
 from .conformance import BUNDLE, KIT, POINTS
@@ -36,8 +36,9 @@ _MOST_ROWS = 1 << 22
 _FLOAT, _NUDGE = 1e-3, 2e-4
 # Points whose answer changes by more than this share of the brightest are at the edge of a cell, and are not asked.
 _EDGE = 2e-3
-_NUMBERS = {"VOXEL_SPENT": rays.SPENT, "VOXEL_GAP": rays.GAP, "VOXEL_TOUCHING": rays.TOUCHING, "VOXEL_OWN_AXIS": rays.OWN_AXIS,
-            "VOXEL_OWN_PLANE": rays.OWN_PLANE, "CONE_TIGHT": cones.TIGHT, "CONE_SUPPORT": cones.SUPPORT}
+_NUMBERS = {"VOXEL_SPENT": rays.SPENT, "VOXEL_GAP": rays.GAP, "VOXEL_PLATE": rays.PLATE, "VOXEL_NO_PLATE": NO_PLATE,
+            "VOXEL_TOUCHING": rays.TOUCHING, "VOXEL_OWN_AXIS": rays.OWN_AXIS, "VOXEL_OWN_PLANE": rays.OWN_PLANE,
+            "CONE_TIGHT": cones.TIGHT, "CONE_SUPPORT": cones.SUPPORT}
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,8 +155,10 @@ def kit_voxels(axes: Axes) -> EngineVoxels:
     sky = np.concatenate([[[1.5, 1.8, 2.2]], 0.2 * rng.normal(size=(8, 3))])
     # Some faces are fronts, so there are walls here and there.
     front, nothing = np.where(rng.random(6 * count) < 0.4, np.float32(1), np.float32(-1)), np.zeros(6 * count, np.float32)
+    plates = np.where(rng.random((count, 3)) < 0.5, rng.uniform(-0.5, 0.5, (count, 3)), NO_PLATE).astype(np.float32)
     seen = Seen(np.arange(6 * count), nothing + 1, nothing.astype(np.int32), nothing, nothing, front)
-    voxels = Voxels(grid, cells, opacity, area, normal, np.zeros((count, 3)), lie, middle, kind != 2, seen)
+    voxels = Voxels(grid, cells, opacity, area, normal, np.zeros((count, 3)), lie, middle, kind != 2,
+                    plates, seen)
     tables = rounded(pack(build_hierarchy(voxels, radiance)))
     return EngineVoxels(ShippedVoxels(tables, 16, 0.5, 3.0, sky), axes)
 

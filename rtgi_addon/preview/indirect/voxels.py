@@ -21,6 +21,7 @@ from ...transport.paths.sources import Sources
 from ...transport.voxels import cones, rays
 from ...transport.voxels.hierarchy import Hierarchy
 from ...transport.voxels.tables import VoxelTables, pack, row_numbers
+from ...transport.voxels.voxelize import NO_PLATE
 from ..packing import fold, folded
 from ..uniforms import UniformStruct
 from .tables import Tables
@@ -120,7 +121,8 @@ def _beyond(lit: LitVoxels) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return hides, sky, bright
 
 
-_LENGTHS = {"VOXEL_SPENT": rays.SPENT, "VOXEL_GAP": rays.GAP, "VOXEL_TOUCHING": rays.TOUCHING, "VOXEL_OWN_AXIS": rays.OWN_AXIS,
-            "VOXEL_OWN_PLANE": rays.OWN_PLANE, "CONE_TIGHT": cones.TIGHT, "CONE_SUPPORT": cones.SUPPORT}
+_LENGTHS = {"VOXEL_SPENT": rays.SPENT, "VOXEL_GAP": rays.GAP, "VOXEL_PLATE": rays.PLATE, "VOXEL_NO_PLATE": NO_PLATE,
+            "VOXEL_TOUCHING": rays.TOUCHING, "VOXEL_OWN_AXIS": rays.OWN_AXIS, "VOXEL_OWN_PLANE": rays.OWN_PLANE,
+            "CONE_TIGHT": cones.TIGHT, "CONE_SUPPORT": cones.SUPPORT}
 _CONSTANTS = (*((name, repr(float(value))) for name, value in _LENGTHS.items()), ("SKY_RING", str(RING)),
               ("MARCH_STREAM", f"{STREAM}u"))

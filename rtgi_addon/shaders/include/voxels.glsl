@@ -22,7 +22,7 @@ struct VoxelRay {
   bool surface;
 };
 
-// What a voxel holds, as Level has it (transport/voxels/hierarchy.py).
+// What a voxel holds, as Level has it (transport/voxels/hierarchy.py); `plane` may be plates.
 struct Voxel {
   vec3 depth;
   bool adds;
@@ -109,7 +109,17 @@ vec4 voxel_met(VoxelRay ray, int row, vec3 place, float at, float end)
   float before = dot(voxel.plane.xyz, place + ray.direction * at) - voxel.plane.w;
   float through = dot(voxel.plane.xyz, way);
   float after = before + through;
-  float cut = min(before, after) < VOXEL_GAP && max(before, after) > -VOXEL_GAP ? voxel.filled : 0.0;
+  float cut = min(before, after) < VOXEL_GAP && max(before, after) > -VOXEL_GAP ? max(voxel.filled, 0.0) : 0.0;
+  if (voxel.filled < 0.0) {
+    // What lies across an axis is met where it lies, and not on the way there.
+    vec3 begin = place + ray.direction * at - voxel.plane.xyz;
+    vec3 last = begin + way;
+    for (int axis = 0; axis < 3; axis++) {
+      if (voxel.plane[axis] < VOXEL_NO_PLATE) {
+        crossed[axis] = min(begin[axis], last[axis]) < VOXEL_PLATE && max(begin[axis], last[axis]) > -VOXEL_PLATE ? 1.0 : 0.0;
+      }
+    }
+  }
   if (ray.surface) {
     vec3 own = abs(ray.normal);
     if (abs(dot(place, ray.normal)) <= 0.5 * (own.x + own.y + own.z) + VOXEL_TOUCHING) {

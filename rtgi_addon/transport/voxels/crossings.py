@@ -32,11 +32,16 @@ class Crossings:
     u: np.ndarray
     v: np.ndarray
 
+    @property
+    def within(self) -> np.ndarray:
+        """Where in their cells the crossings are along the axis (n,), in cells from the centres."""
+        return self.depth - np.floor(self.depth + np.float32(TIE)) - np.float32(0.5)
+
     def places(self, lines: int) -> list[np.ndarray]:
         """Where in their cells the crossings are along x, y and z (n,), in cells from the centres; ``lines`` as they were made
         with."""
         row = self.line // lines
-        within = (self.depth - np.floor(self.depth + np.float32(TIE)) - np.float32(0.5),
+        within = (self.within,
                   (self.line - row * lines + np.float32(0.5)) * np.float32(1.0 / lines) - np.float32(0.5),
                   (row + np.float32(0.5)) * np.float32(1.0 / lines) - np.float32(0.5))
         return [within[(axis - self.axis) % 3] for axis in range(3)]

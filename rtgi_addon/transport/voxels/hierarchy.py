@@ -16,6 +16,10 @@ Of a sheet, that is opaque surfaces which lie in one plane, each cell is met in 
 them crosses it in the next. So rays are asked where they cross it, and for cones shares of crossings, |Σ ±cₐ·ωₐ|·d, add up to 1 and
 do not multiply; and a sheet shows the side that faces the eye. By axes a slanted wall would let an eighth of all light through, and
 show some of its back to whoever looks at its front.
+
+Of what lies in no plane, as where a wall meets a floor, rays are asked as well where they cross what lies across an axis, if all
+does that lines along it meet (Voxels.plates). By the way through the cell a floor would end all who come into such a cell above
+it: windows and slits would be narrower by up to a cell on each side, and their rooms darker.
 """
 
 from dataclasses import dataclass
@@ -23,7 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .grid import FACES, VoxelGrid
-from .voxelize import Voxels
+from .voxelize import NO_PLATE, Voxels
 from .walls import Walls, too_wide
 
 # Optical depth of what lets nothing through: e^-12 is 6 in a million.
@@ -47,7 +51,8 @@ class Level:
     at 2·row for an eye that looks against that normal and 2·row + 1 for one that looks along it. ``adds`` (r,) bool tells cells of
     coarser levels whose surfaces are solid and lie in no plane: from afar these are parts of one surface as well, and ``depth``
     holds shares of crossings. Of the finest level's, ``plane`` (r, 5) float32 holds the unit normal, how far from the cell's centre
-    along it the sheet lies, in cells, and how much of the plane in the cell it fills. ``wide`` (nz·ny·nx,) bool: where a sample
+    along it the sheet lies, in cells, and how much of the plane in the cell it fills; or, where that is -1, where along x, y and z
+    lies all that blocks along it (Voxels.plates). ``wide`` (nz·ny·nx,) bool: where a sample
     between a cell and the seven up from it would mix what walls keep apart (walls.py).
     """
 
@@ -79,7 +84,7 @@ class Hierarchy:
 @dataclass(frozen=True, eq=False)
 class _Cells:
     """Cells at ``place`` (m, 3) with ``opacity`` (m, 3) and premultiplied ``radiance`` (m, 6, 3); ``area`` (m,) in faces of a
-    finest cell, ``lie`` (m, 6), ``solid`` (m,) and, of the finest alone, ``middle`` (m, 3) as in Voxels."""
+    finest cell, ``lie`` (m, 6), ``solid`` (m,) and, of the finest alone, ``middle`` (m, 3) and ``plates`` (m, 3) as in Voxels."""
 
     place: np.ndarray
     opacity: np.ndarray
@@ -88,13 +93,14 @@ class _Cells:
     lie: np.ndarray
     solid: np.ndarray
     middle: np.ndarray | None = None
+    plates: np.ndarray | None = None
 
 
 def build_hierarchy(voxels: Voxels, radiance: np.ndarray, levels: int | None = None) -> Hierarchy:
     """``levels`` (None: until a single cell is left) of ``voxels`` whose faces show ``radiance`` (m, 6, 3), premultiplied."""
     place = voxels.place
     area = voxels.area / voxels.grid.cell**2
-    cells = _Cells(place, voxels.opacity, radiance, area, voxels.lie, voxels.solid, voxels.middle)
+    cells = _Cells(place, voxels.opacity, radiance, area, voxels.lie, voxels.solid, voxels.middle, voxels.plates)
     shape, size, made = voxels.grid.shape, 1, []
     while True:
         made.append(_level(size, shape, cells, voxels.walls))
@@ -129,6 +135,8 @@ def _level(size: int, shape, cells: _Cells, walls: Walls) -> Level:
         offset = (normal * cells.middle).sum(axis=1)
         plane[1:, :3], plane[1:, 3] = normal, offset
         plane[1:, 4] = np.where(flat, np.minimum(_FILLED * cells.area / np.maximum(section(normal, offset), _CORNER), 1.0), 0.0)
+        held = 1 + np.flatnonzero(~flat & (cells.plates != NO_PLATE).any(axis=1))
+        plane[held, :3], plane[held, 3:] = cells.plates[held - 1], (0.0, -1.0)
     return Level(size, padded, row, depth, glow.reshape(-1, 3), sheet, shown.reshape(-1, 3),
                  np.append(False, adds), plane, too_wide(walls, size, padded))
 

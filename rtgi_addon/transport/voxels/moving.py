@@ -18,7 +18,7 @@ from ..surfaces.geometry import Geometry
 from .crossings import TIE
 from .grid import FACES
 from .injection import inject
-from .voxelize import Seen, Voxels
+from .voxelize import NO_PLATE, Seen, Voxels
 
 _TINY = np.finfo(np.float64).tiny
 # Products of a normal's components, in the order of Voxels.lie.
@@ -67,7 +67,8 @@ def without(voxels: Voxels, shown: np.ndarray, gone: np.ndarray, geometry: Geome
     means = _means(cell, share, cells, normals, np.clip(middle, -0.5, 0.5))
     normal, lie, middle = (np.where(touched[:, None], new, old) for new, old in
                            zip(means, (voxels.normal, voxels.lie, voxels.middle), strict=True))
-    result = replace(voxels, opacity=opacity, area=area, normal=normal, lie=lie, middle=middle, seen=left)
+    plates = np.where(touched[:, None], NO_PLATE, voxels.plates)
+    result = replace(voxels, opacity=opacity, area=area, normal=normal, lie=lie, middle=middle, plates=plates, seen=left)
     radiance = result.by_face(shown[kept])
     stays = ~touched | (opacity.max(axis=1) > 0)
     return _rows(result, stays), radiance[stays]
@@ -112,10 +113,13 @@ def with_points(voxels: Voxels, radiance: np.ndarray, points: CameraPoints) -> t
                                    zip(new, (voxels.normal, voxels.lie, voxels.middle, voxels.albedo), strict=True))
     solid = np.ones(count, bool)
     solid[before] = voxels.solid
+    plates = np.full((count, 3), NO_PLATE)
+    plates[before] = voxels.plates
+    plates[at] = NO_PLATE
     area = np.maximum(added, old)
     seen = replace(voxels.seen, face=FACES * before.astype(np.int64)[voxels.seen.face // FACES] + voxels.seen.face % FACES)
     result = replace(voxels, cells=cells, opacity=opacity.astype(np.float32), area=area, normal=normal, albedo=albedo, lie=lie,
-                     middle=middle, solid=solid, seen=seen)
+                     middle=middle, solid=solid, plates=plates, seen=seen)
     return result, light.astype(np.float32)
 
 
@@ -136,5 +140,5 @@ def _rows(voxels: Voxels, stays: np.ndarray) -> Voxels:
     inside = stays[voxels.seen.face // FACES]
     seen = Seen(*(getattr(voxels.seen, name)[inside] for name in Seen.__dataclass_fields__))
     seen = replace(seen, face=FACES * renumbered[seen.face // FACES] + seen.face % FACES)
-    names = ("cells", "opacity", "area", "normal", "albedo", "lie", "middle", "solid")
+    names = ("cells", "opacity", "area", "normal", "albedo", "lie", "middle", "solid", "plates")
     return replace(voxels, seen=seen, **{name: getattr(voxels, name)[stays] for name in names})

@@ -12,6 +12,7 @@ import numpy as np
 from ..vectors import dot
 from .grid import VoxelGrid
 from .hierarchy import Hierarchy, Level
+from .voxelize import NO_PLATE
 
 # Where so little is left of a ray, the rest is taken for nothing.
 SPENT = np.float32(1e-3)
@@ -20,6 +21,8 @@ SPENT = np.float32(1e-3)
 OWN_AXIS, TOUCHING, OWN_PLANE = np.float32(0.25), np.float32(0.02), np.float32(0.7)
 # Cells' planes do not quite meet where a surface is curved: a sheet reaches this far to either side, in cells.
 GAP = np.float32(0.03)
+# A plate is met this close to it, in cells.
+PLATE = np.float32(0.005)
 # Rays go on in step; those that have ended are dropped this often.
 _DROP = 8
 
@@ -133,10 +136,19 @@ class _Walk:
         level, crossed, plane = self._level, np.abs(way), self._level.plane[row]
         # A sheet is met where the ray crosses its plane.
         normal = plane[:, :3]
-        before = dot(normal, (self._from[met] + self._slope[met] * self.at[met, None]).astype(np.float32)) - plane[:, 3]
+        place = (self._from[met] + self._slope[met] * self.at[met, None]).astype(np.float32)
+        before = dot(normal, place) - plane[:, 3]
         through = dot(normal, way)
         after = before + through
-        cut = np.where((np.minimum(before, after) < GAP) & (np.maximum(before, after) > -GAP), plane[:, 4], np.float32(0))
+        near = (np.minimum(before, after) < GAP) & (np.maximum(before, after) > -GAP)
+        cut = np.where(near, np.maximum(plane[:, 4], np.float32(0)), np.float32(0))
+        held = np.flatnonzero(plane[:, 4] < 0)
+        if held.size:
+            # What lies across an axis is met where it lies, and not on the way there.
+            begin = place[held] - normal[held]
+            end = begin + way[held]
+            hit = (np.minimum(begin, end) < PLATE) & (np.maximum(begin, end) > -PLATE)
+            crossed[held] = np.where(normal[held] != NO_PLATE, hit, crossed[held])
         if self._normals is not None:
             own = self._normals[met]
             touching = np.abs(dot(self._from[met], own)) <= self._reach[met]

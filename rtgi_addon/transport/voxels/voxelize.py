@@ -28,6 +28,8 @@ from .walls import Walls, find_walls
 LINES = 4
 # Of the lines of a face so many carry its light, spread as rooks on a chess board: one of each row and column.
 _ROOKS = {1: (0,), 2: (0, 1), 3: (1, 2, 0), 4: (1, 3, 0, 2)}
+# How far, RMS in cells, the places where lines meet a cell's surfaces may lie about a plane across them; where there is none.
+_LEVEL, NO_PLATE = 0.003, np.float32(9.0)
 # Coverage from which on a surface lets nothing through.
 _COVERED = 0.999
 # Surfaces in one column of one cell that are told apart; further ones are behind so many.
@@ -53,8 +55,9 @@ class Voxels:
     """The cells of ``grid`` that hold surfaces: flat indices ``cells`` (m,) int64, ascending. ``opacity`` (m, 3) float32: the share
     of lines along x, y, z that what is in the cell blocks. ``area`` (m,) float64 [m²]; ``normal`` (m, 3) float64 the mean of the
     fronts' normals, ``albedo`` (m, 3) float64 the mean of both sides' and ``lie`` (m, 6) float64 of nx², ny², nz², ny·nz, nx·nz,
-    nx·ny over that area, by coverage; ``solid`` (m,) bool: nothing in the cell lets anything through by its coverage. ``seen`` is
-    what the faces show."""
+    nx·ny over that area, by coverage; ``solid`` (m,) bool: nothing in the cell lets anything through by its coverage. ``plates``
+    (m, 3) float32: where along x, y, z, in cells from the centre, all lies that lines along that axis meet, NO_PLATE where that is
+    no plane across it. ``seen`` is what the faces show."""
 
     grid: VoxelGrid
     cells: np.ndarray
@@ -65,6 +68,7 @@ class Voxels:
     lie: np.ndarray
     middle: np.ndarray
     solid: np.ndarray
+    plates: np.ndarray
     seen: Seen
 
     @property
@@ -119,11 +123,12 @@ def voxelize(geometry: Geometry, surfaces: Surfaces, grid: VoxelGrid, threads: i
     row[cells] = np.arange(len(cells), dtype=np.int32)
     axes = parallel_for(lambda axis: _along(parts[axis], geometry, surfaces, row, len(cells), lines), 3, threads)
     opacity = np.stack([opacity for opacity, _ in axes], axis=1)
+    plates = np.stack([_plates(part, row, len(cells)) for part in parts], axis=1)
     seen = Seen(*(np.concatenate([getattr(seen, name) for _, seen in axes]) for name in Seen.__dataclass_fields__))
     sums = _sums(geometry, surfaces, parts, (lone, place), area, row, len(cells), lines)
     covered = np.maximum(sums[:, 1:2], np.finfo(np.float64).tiny)
     means = (sums[:, columns] / covered for columns in (slice(2, 5), slice(5, 8), slice(8, 14), slice(14, 17)))
-    return Voxels(grid, cells, opacity, sums[:, 0], *means, sums[:, 17] == 0, seen)
+    return Voxels(grid, cells, opacity, sums[:, 0], *means, sums[:, 17] == 0, plates, seen)
 
 
 def _areas(geometry: Geometry, cut, parts: list[Crossings], grid: VoxelGrid, lines: int) -> np.ndarray:
@@ -184,6 +189,15 @@ def _along(part: Crossings, geometry: Geometry, surfaces: Surfaces, row, cells: 
         scaled = weight[rows] * (shown / np.maximum(carried, 1e-30))[face[rows]]
         faces.append(Seen(face[rows], scaled.astype(np.float32), part.primitive[rows], part.u[rows], part.v[rows], side[rows]))
     return opacity, Seen(*(np.concatenate([getattr(seen, name) for seen in faces]) for name in Seen.__dataclass_fields__))
+
+
+def _plates(part: Crossings, row, cells: int) -> np.ndarray:
+    """Voxels.plates (m,) along one axis."""
+    cell, place = row[part.cell], part.within
+    count = np.bincount(cell, minlength=cells)
+    mean, square = (np.bincount(cell, values, cells) / np.maximum(count, 1) for values in (place, place * place))
+    plane = (count > 0) & (square - mean * mean < _LEVEL**2)
+    return np.where(plane, mean, NO_PLATE).astype(np.float32)
 
 
 def _composite(key: np.ndarray, alpha: np.ndarray) -> np.ndarray:

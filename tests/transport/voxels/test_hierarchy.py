@@ -13,7 +13,7 @@ from rtgi_addon.transport.voxels import VoxelGrid, Voxels, cones, grid_around, v
 from rtgi_addon.transport.voxels.hierarchy import build_hierarchy
 from rtgi_addon.transport.voxels.rays import march
 from rtgi_addon.transport.voxels.tables import pack, row_numbers, unpack
-from rtgi_addon.transport.voxels.voxelize import Seen
+from rtgi_addon.transport.voxels.voxelize import NO_PLATE, Seen
 from rtgi_addon.transport.voxels.walls import find_walls, too_wide
 
 
@@ -38,7 +38,7 @@ def filled(grid, cells, opacity, lie, solid):
     """Voxels of which all is alike."""
     count, nothing = len(cells), np.zeros((len(cells), 3))
     return Voxels(grid, cells, opacity, np.ones(count), nothing, nothing, np.tile(lie, (count, 1)), nothing, np.full(count, solid),
-                  Seen(*(np.zeros(0, int) for _ in range(6))))
+                  np.full((count, 3), NO_PLATE), Seen(*(np.zeros(0, int) for _ in range(6))))
 
 
 def irradiance(hierarchy, points, normals, count, beyond=0.0):
@@ -153,6 +153,19 @@ def test_form_factors_of_plates(perpendicular):
     assert fine < 0.02 and fine < coarse
 
 
+@pytest.mark.parametrize("perpendicular", [False, True])
+def test_form_factors_near_the_exact_ones_as_cells_shrink(perpendicular):
+    """By rays, with the cell. By cones too, if there are four times as many for cells half as large; so many that are fixed stay
+    off."""
+    exact = 0.200044 if perpendicular else 0.199825
+    by_rays = [abs(plates(perpendicular, resolution) / exact - 1) for resolution in (12, 24, 48)]
+    assert by_rays[0] < 0.07 and by_rays[1] < 0.6 * by_rays[0] and by_rays[2] < 0.6 * by_rays[1]
+    coarse, fine = (plates(perpendicular, resolution, count) / exact - 1 for resolution, count in ((12, 64), (24, 256)))
+    assert 0 < fine < 0.7 * coarse
+    fixed = [plates(perpendicular, resolution, 16) / exact - 1 for resolution in (24, 48)]
+    assert fixed[1] > 0.9 * fixed[0]
+
+
 @pytest.mark.parametrize(("perpendicular", "most"), [(False, 0.2), (True, 0.07)])
 def test_form_factors_by_cones_near_the_exact_ones_as_cones_narrow(perpendicular, most):
     """They stay above: what ends reaches further by a part of the voxels that a cone reads."""
@@ -224,3 +237,41 @@ def test_lists_keep_where_cells_are_too_wide():
     again, numbers = unpack(tables), row_numbers(tables)
     assert tables.wide.any() and np.array_equal(numbers * 4 % 2 == 1, tables.wide)
     assert all(np.array_equal(one.wide, two.wide) for one, two in zip(hierarchy.levels, again.levels, strict=True))
+
+
+def test_what_lies_across_an_axis_is_met_where_it_lies():
+    """A floor with a board on it in one cell: who passes above the floor and beside the board meets neither."""
+    parts = rooms.quad("floor", (0, 0, 0.3), (1, 0, 0), (0, 1, 0)), rooms.quad("board", (0.2, 0, 0.3), (0, 0.2, 0), (0, 0, 0.6))
+    hierarchy, voxels = black(parts, VoxelGrid((-1.0, -1.0, -1.0), 1.0, (3, 3, 3)))
+    assert voxels.plates[0, [0, 2]] == pytest.approx([-0.3, -0.2], abs=1e-6) and voxels.plates[0, 1] == NO_PLATE
+    assert not hierarchy.levels[0].sheet.any()
+    beside, down = np.float32([[0.5, 0.6, 0.95]]), np.float32([[1.0, 0.0, -0.3]]) / np.float32(np.sqrt(1.09))
+    assert march(hierarchy, beside, down).passed == pytest.approx([1.0])
+    # The floor ends all that comes down on it, slowly or not; the board takes its share of all that goes by where it stands.
+    slow = np.float32([[0.3, 0.1, -0.2]]) / np.float32(np.sqrt(0.14))
+    for direction in (np.float32([[0, 0, -1]]), slow):
+        assert march(hierarchy, np.float32([[0.5, 0.6, 0.5]]), direction).passed == pytest.approx([0.0])
+    share = float(voxels.opacity[0, 0])
+    assert march(hierarchy, np.float32([[0.5, 0.6, 0.8]]), np.float32([[-1, 0, 0]])).passed == pytest.approx([1.0 - share])
+    assert 0.1 < share < 0.25
+
+
+def test_a_sheet_and_the_plates_of_an_edge_in_it_let_nothing_through_between_them():
+    """A box on a floor: rays from above, however they are slanted, end on one or the other."""
+    floor, box = build.plane(half_size=4.0, z=0.13), build.cube("box", 0.71)
+    hierarchy, _ = black([floor, box], VoxelGrid((-4.0, -4.0, -4.0), 0.5, (16, 16, 16)))
+    rng = np.random.default_rng(3)
+    directions = rng.normal(size=(400, 3)) * [1.0, 1.0, 0.3]
+    directions[:, 2] = -np.abs(directions[:, 2]) - 0.2
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    goals = np.concatenate([rng.uniform(-1.5, 1.5, (400, 2)), np.full((400, 1), 0.13)], axis=1)
+    origins = (goals - directions * 1.5).astype(np.float32)
+    assert march(hierarchy, origins, directions.astype(np.float32)).passed.max() < 1e-3
+
+
+def black(meshes, grid):
+    """Hierarchy and Voxels of ``meshes`` that show nothing."""
+    scene = build.scene(meshes)
+    geometry = flatten(scene)
+    voxels = voxelize(geometry, Surfaces(scene, geometry), grid)
+    return build_hierarchy(voxels, np.zeros((len(voxels.cells), 6, 3), np.float32)), voxels

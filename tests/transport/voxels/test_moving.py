@@ -107,7 +107,8 @@ def test_a_camera_puts_in_what_lines_find():
     context, voxels = voxels_of(scene(floor=False))
     nothing = replace(voxels, cells=voxels.cells[:0], opacity=voxels.opacity[:0], area=voxels.area[:0],
                       normal=voxels.normal[:0], albedo=voxels.albedo[:0], lie=voxels.lie[:0], middle=voxels.middle[:0],
-                      solid=voxels.solid[:0], seen=Seen(*(part[:0] for part in vars(voxels.seen).values())))
+                      solid=voxels.solid[:0], plates=voxels.plates[:0],
+                      seen=Seen(*(part[:0] for part in vars(voxels.seen).values())))
     put, radiance = with_points(nothing, np.zeros((0, 6, 3), np.float32), seen_by(context, camera(), radiance=2.0))
     _, top = voxels_of(scene(floor=False))
     known = {int(cell): row for row, cell in enumerate(top.cells)}
