@@ -65,6 +65,10 @@ class Effect(ABC):
         """Whether it adds what glossy layers reflect beside lamps: two that do add it twice."""
         return False
 
+    def gathering(self, settings, times: float):
+        """``settings`` with ``times`` as many rays for the light that it keeps as GATHERED: the same where it gathers none."""
+        return settings
+
     def has_gpu_half(self, settings) -> bool:
         """Whether its half on the GPU, if it has one of its own, does what ``settings`` ask for."""
         return True

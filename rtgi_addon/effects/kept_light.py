@@ -29,11 +29,15 @@ class KeptLight(KnownLight):
     def __init__(self):
         # Of each: points, normals, irradiance and albedo (h·w, 3), halves where they are as good.
         self._samples: list[tuple[np.ndarray, ...]] = []
+        # By how much each counts.
+        self._weights: list[float] = []
         self._enough: np.ndarray | None = None
 
-    def add(self, frame: Frame) -> None:
-        """Keep what a sample of the whole picture gathered, if any effect did."""
+    def add(self, frame: Frame, weight: float = 1.0) -> None:
+        """Keep what a sample of the whole picture gathered, if any effect did; it counts by ``weight``, as the number of its rays
+        is."""
         if GATHERED in frame.kept:
+            self._weights.append(weight)
             gbuffer = frame.gbuffer
             parts = ((gbuffer.position, np.float32), (gbuffer.normal, np.float16), (frame.kept[GATHERED], np.float32),
                      (gbuffer.albedo, np.float16))
@@ -52,11 +56,12 @@ class KeptLight(KnownLight):
         for number, (points, normals, light, albedo) in enumerate(self._samples):
             others = [other for other in range(count) if (other < count // 2) != (number < count // 2)]
             expected, found = self._mean(others, pixel, points, normals, width)
-            # One sample against the mean of others that know the place as well.
-            off = np.square((light - expected) * albedo * np.float32(1.0 / np.pi)).mean(axis=1) / (1.0 + 1.0 / max(len(others), 1))
+            # One sample against the mean of others that know the place as well: the square of what weight 1 is off by.
+            worth = 1.0 / self._weights[number] + 1.0 / max(sum(self._weights[other] for other in others), _TINY)
+            off = np.square((light - expected) * albedo * np.float32(1.0 / np.pi)).mean(axis=1) / worth
             squares += np.where(found, off, 0.0)
             known += found
-        squares = (squares / np.maximum(known, 1.0) / max(count, 1)).reshape(shape)
+        squares = (squares / np.maximum(known, 1.0) / max(sum(self._weights), _TINY)).reshape(shape)
         enough = (around(squares) <= _MOST * allowed) & (known.reshape(shape) > 0)
         self._enough, squares = enough.reshape(-1), np.where(enough, squares, 0.0)
         return squares, bool(squares.mean() <= _PART * allowed)
@@ -68,13 +73,16 @@ class KeptLight(KnownLight):
 
     def _mean(self, numbers, pixel, points, normals, width) -> tuple[np.ndarray, np.ndarray]:
         """As ``at``, from some of the samples."""
-        total, weight, inverse = np.zeros(points.shape, np.float32), np.zeros(len(points), np.float32), np.float32(1.0) / width
+        total, inverse = np.zeros(points.shape, np.float32), np.float32(1.0) / width
+        weight, found = np.zeros((2, len(points)), np.float32)
         for number in numbers:
             kept_points, kept_normals, light, _ = (np.take(part, pixel, axis=0) for part in self._samples[number])
             off = sum(normals[:, axis] * (kept_points[:, axis] - points[:, axis]) for axis in range(3)) * inverse
             alike = sum(normals[:, axis] * kept_normals[:, axis] for axis in range(3))
             counts = np.exp2(np.float32(_NORMAL_POWER) * np.log2(np.maximum(alike, _TINY)) - np.float32(4.0) * off * off)
+            found += counts
+            counts *= np.float32(self._weights[number])
             total += light * counts[:, None]
             weight += counts
-        return total / np.maximum(weight, _TINY)[:, None], weight >= _LEAST_WEIGHT
+        return total / np.maximum(weight, _TINY)[:, None], found >= _LEAST_WEIGHT
 

@@ -23,6 +23,10 @@ from .passes import NOT_AVERAGED, pass_of
 _MORE = 2
 # Where indirect light is what is noisy, so many samples have all pixels before single ones have more.
 _WHOLE = 6, 8, 12, 16
+# Where an error is asked for, the first samples of all pixels have so many times the rays that are set for indirect light, and
+# later ones so many: most scenes know it well enough from few; where more are needed, a sample costs more than its rays, which are
+# better spent on few samples.
+_SPARE, _AMPLE = 0.5, 2.0
 # Samples of single pixels that are drawn at once, as many as make the cost of each small beside that of its rays.
 _AT_ONCE = 1 << 16
 # The share of the progress that is over when errors are first looked at.
@@ -63,33 +67,40 @@ def draw_pictures(scene: Scene | LightContext, field: Field | None, view: Camera
     applied = "combined" in shown or error is not None or any(name in EFFECT_PASSES for name in shown)
     film, single, light = Film(size, averaged), {}, KeptLight()
 
-    def sample(index: int, before: History | None = None) -> Frame:
+    def sample(index: int, before: History | None = None, times: float = 1.0) -> Frame:
         frame = draw_frame(scene if context is None else context, field, view, size, index=index, offset=sample_offset(index),
                            transparent=transparent, history=before)
-        return apply_all(frame, field, effects) if applied else frame
+        return apply_all(frame, field, _gathering(effects, times)) if applied else frame
 
     def single_pixels(samples: Samples) -> Frame:
         return apply_all(draw_samples(context, field, view, samples, transparent=transparent), field, effects)
 
     first = (1 if not averaged else samples) if error is None else min(samples, FIRST)
+    local = error is not None and context is not None and all(entry.effect.local for entry in effects)
+    times = _SPARE if local else 1.0
     for index in range(first):
         progress.step(index / first * (1.0 if error is None else _FIRST_SHARE), "Drawing")
         if index == first // 2:
             film.look()
-        frame = sample(index, history)
+        frame = sample(index, history, times)
         history = frame.history
         film.add(frame)
-        if error is not None:
-            light.add(frame)
+        if local:
+            light.add(frame, times)
         single.update({name: pass_of(frame, name) for name in once} if index == 0 else {})
     if error is not None:
-        if context is not None and all(entry.effect.local for entry in effects):
-            _until_light_is_known(film, frame, sample, error, samples, light, progress)
+        if local:
+            _until_light_is_known(film, frame, lambda index: sample(index, None, _AMPLE), error, samples, light, progress)
             _where_needed(film, single_pixels, error, samples, light, progress)
         else:
             _everywhere(film, sample, history, error, samples, progress)
     pictures = {**{name: film.picture(name) for name in averaged}, **single}
     return Drawn(pictures, float(film.count.mean()), None if error is None else film.error())
+
+
+def _gathering(effects: tuple[Chosen, ...], times: float) -> tuple[Chosen, ...]:
+    """``effects`` with ``times`` as many rays for indirect light."""
+    return tuple(Chosen(entry.effect, entry.effect.gathering(entry.settings, times)) for entry in effects)
 
 
 def _until_light_is_known(film: Film, frame: Frame, draw: Callable[[int], Frame], error: float, most: int, light: KeptLight,
@@ -106,7 +117,7 @@ def _until_light_is_known(film: Film, frame: Frame, draw: Callable[[int], Frame]
             progress.step(_FIRST_SHARE, "Drawing")
             frame = draw(index)
             film.add(frame)
-            light.add(frame)
+            light.add(frame, _AMPLE)
     film.hold(held)
 
 

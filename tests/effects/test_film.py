@@ -10,6 +10,7 @@ from rtgi_addon.effects import Chosen, get, picture
 from rtgi_addon.effects.base import apply_all
 from rtgi_addon.effects.film import _ONE_LOOK, FIRST, Film
 from rtgi_addon.effects.frame import Samples
+from rtgi_addon.effects.kept_light import KeptLight
 from rtgi_addon.effects.lit import draw_frame, draw_samples, light_context
 from rtgi_addon.effects.picture import draw_pictures
 from rtgi_addon.transport.views.pixel_filter import sample_offset
@@ -95,6 +96,31 @@ def test_samples_that_refine_a_picture_gather_what_is_unknown_whatever_the_budge
     frame = draw_samples(context, None, view(), samples)
     ample, scarce = (effect.apply(frame, None, effect.Settings(16, budget=budget)) for budget in (100.0, 0.001))
     assert np.array_equal(ample, scarce)
+
+
+def test_first_samples_have_half_the_rays_and_later_whole_ones_twice_as_many(context, monkeypatch):
+    """Of effects that gather light by rays, where an error is asked for; samples of single pixels have what is set."""
+    effect, rays = get("ray_traced"), []
+    apply = type(effect).apply
+
+    def counted(self, frame, field, settings):
+        rays.append((frame.samples is not None, settings.diffuse_rays))
+        return apply(self, frame, field, settings)
+
+    monkeypatch.setattr(type(effect), "apply", counted)
+    # As if its light was never known well enough.
+    settle = KeptLight.settle
+    monkeypatch.setattr(KeptLight, "settle", lambda *arguments: (settle(*arguments)[0], False))
+    by_rays(context, 0.001, 32)
+    whole = [count for single, count in rays if not single]
+    assert whole[:FIRST] == [2] * FIRST and whole[FIRST:] and set(whole[FIRST:]) == {8}
+    assert {count for single, count in rays if single} == {4}
+    rays.clear()
+    by_rays(context, None, 2)
+    assert rays == [(False, 4)] * 2
+    plain = effect.Settings(diffuse_rays=0)
+    assert effect.gathering(plain, 2.0) == plain and effect.gathering(effect.Settings(1), 0.5).diffuse_rays == 1
+    assert effect.gathering(effect.Settings(1000), 2.0).diffuse_rays == 1024
 
 
 def test_pictures_by_need_are_the_same_for_any_number_of_threads():

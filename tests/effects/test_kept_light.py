@@ -56,6 +56,22 @@ def test_what_light_is_off_by_is_that_of_the_mean():
     assert not asked(light)[1].any() and not noisy.any()
 
 
+def test_samples_of_more_rays_count_more():
+    light, rng, weights = KeptLight(), np.random.default_rng(1), (0.5, 0.5, 0.5, 0.5, 2.0, 2.0)
+    for weight in weights:
+        light.add(shown(2.0 + 0.4 / np.sqrt(weight) * rng.standard_normal(SHAPE)), weight)
+    held, _ = light.settle(shown(0.0), 1.0)
+    off = np.square(asked(light)[0][:, 0] - 2.0)
+    # Noise of weight 1 is 0.4, and all together weigh 6.
+    assert off.mean() == pytest.approx(0.4**2 / sum(weights), rel=0.15)
+    assert held.mean() == pytest.approx((0.5 / np.pi) ** 2 * off.mean(), rel=0.15)
+    # A single one knows the place, however little it weighs.
+    faint = KeptLight()
+    faint.add(shown(3.0), 0.1)
+    faint.settle(shown(0.0), 1e9)
+    assert asked(faint)[0] == pytest.approx(3.0)
+
+
 def test_memory_is_bounded(monkeypatch):
     light = KeptLight()
     light.add(shown(1.0))

@@ -6,7 +6,7 @@ mirror to mirror. Lamps stay as the frame has them, each with rays of its own. W
 Caustics, and highlights of lamps in what a mirror shows, are as the surface cache has them, spread over all directions.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,6 +24,8 @@ from .smoothing import smoothed
 
 # Pixels with rays of their own are no further apart.
 _MOST_APART = 8
+# The most rays of a pixel in a sample.
+_MOST_RAYS = 1024
 
 
 @dataclass(frozen=True)
@@ -31,7 +33,7 @@ class RayTracedSettings:
     """What a user may set."""
 
     diffuse_rays: int = setting(4, "Diffuse Rays", "Rays over the hemisphere of a pixel in each sample of the picture; 0 leaves "
-                                "diffuse light as the bake has it", "", 0, 1024)
+                                "diffuse light as the bake has it", "", 0, _MOST_RAYS)
     glossy_rays: int = setting(1, "Glossy Rays", "Rays that a pixel's glossy layer reflects in each sample of the picture; 0 shows "
                                "no reflections but those of lamps", "", 0, 1024)
     budget: float = setting(0.5, "Ray Budget", "Most diffuse rays in each sample of the picture, in millions: of large pictures "
@@ -53,6 +55,11 @@ class RayTracedEffect(Effect):
     def mirrors(self, settings: RayTracedSettings) -> bool:
         """See Effect.mirrors."""
         return settings.glossy_rays > 0
+
+    def gathering(self, settings: RayTracedSettings, times: float) -> RayTracedSettings:
+        """See Effect.gathering."""
+        rays = settings.diffuse_rays
+        return settings if not rays else replace(settings, diffuse_rays=min(max(1, round(rays * times)), _MOST_RAYS))
 
     def sweep(self, pixels: int) -> tuple[RayTracedSettings, ...]:
         """Rays, and pixels that have some: one in four of those that the defaults give rays to."""
