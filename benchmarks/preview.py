@@ -75,7 +75,8 @@ class BlenderParts:
 
     def direct(self):
         """Shadow maps and the light of lamps."""
-        self._lamps.draw(self.scene, self._surfaces, self._bounds, self.view, self._frame, self._gbuffer.textures, self._direct)
+        self._lamps.draw(self.scene, self.scene.lights, self._surfaces, self._bounds, self.view, self._frame,
+                         self._gbuffer.textures, self._direct)
         return self._direct
 
     def indirect(self):

@@ -55,10 +55,10 @@ TABLES = {
     "techniques": Table("Techniques against the path reference", "technique_errors.py --techniques probes vpl rsm lpv", 1.5,
                         "--techniques probes vpl rsm lpv --samples cornell_box --points 20 --noise 0.2"),
     "transfer": Table("From transfer", "transfer.py", 0.5, "cornell_box --probes 8 --rays 64"),
-    "without": Table("Without Embree", "without_embree.py cornell_box two_rooms", 0.6, "cornell_box --rays 8 --runs 1"),
+    "without": Table("Without Embree", "without_embree.py cornell_box two_rooms", 0.6, "cornell_box --rays 16 --runs 1"),
     "linear": Table("Cost by size", "linear_cost.py --runs 3", 0.7, "--runs 1"),
     "live": Table("Live probes", "live_probes.py sample_blends/cornell_box.blend sample_blends/atrium.blend", 0.7,
-                  "sample_blends/cornell_box.blend --rays 512"),
+                  "sample_blends/cornell_box.blend --rays 1024"),
     "voxels": Table("Voxels", "voxels.py", 1.5, "--only errors --samples cornell_box --points 20 --noise 0.2"),
 }
 
