@@ -120,7 +120,13 @@ class Reading:
         return Figure(value, figure.standard_error * (figure.value / value if value > 0 else 1.0))
 
     def _noise(self, error: float | None) -> tuple[np.ndarray, float]:
-        """The pilot's variance (n, 3) that a bake to ``error`` does not have, and what its cache is off by."""
+        """The pilot's variance (n, 3) that a bake to ``error`` does not have, and what its cache is off by: for any order."""
+        key = "noise", error
+        if key not in self._known:
+            self._known[key] = self._forgiven(error)
+        return self._known[key]
+
+    def _forgiven(self, error: float | None) -> tuple[np.ndarray, float]:
         forgiven, allowance = self.variance, 0.0
         if error is not None:
             probes = np.flatnonzero(self.model.rays > 0)

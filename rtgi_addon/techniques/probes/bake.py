@@ -3,7 +3,7 @@
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -314,10 +314,18 @@ def batches(items: list[Item]) -> Iterator[list[Item]]:
 def mean_distances(sums: np.ndarray, weight: np.ndarray, resolution: int) -> np.ndarray:
     """Mean and mean squared distance (p, T², 2) from ``sums`` (p, T², 2) over the rays in each cell of a tile of ``resolution`` T
     and their numbers ``weight`` (p, T²)."""
+    around = _spread(resolution)
+    # Probe by probe: OpenBLAS starts threads of its own for larger products, which wait for each other longer than they work.
+    spread = weight + np.matmul(around, weight[:, :, None])[:, :, 0]
+    return (sums + np.matmul(around, sums)) / np.maximum(spread, LEAST_SPREAD)[:, :, None]
+
+
+@cache
+def _spread(resolution: int) -> np.ndarray:
+    """What each cell of a tile of ``resolution`` T adds to each other (T², T²) float32."""
     directions = octahedral.texel_directions(resolution).reshape(-1, 3)
     around = np.maximum(directions @ directions.T, 0) ** SPREAD_POWER * SPREAD_WEIGHT
-    around = np.where(around < LEAST_SPREAD, 0.0, around).astype(np.float32)
-    return (sums + np.matmul(around, sums)) / np.maximum(weight + weight @ around, LEAST_SPREAD)[:, :, None]
+    return np.where(around < LEAST_SPREAD, 0.0, around).astype(np.float32)
 
 
 def surface_cache(context: LightContext, volumes: tuple[ProbeVolume, ...], settings: ProbeSettings, seed: int) -> SurfaceCache:
