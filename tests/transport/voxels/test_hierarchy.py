@@ -221,14 +221,21 @@ def test_a_wall_is_what_has_its_inside_between_its_fronts():
 
 
 def test_cells_are_too_wide_from_the_walls_twice_their_thickness_on():
-    walls = find_walls(np.array([[16, 8, 8], [19, 8, 8]]), columns("<", ">"))
+    # A wall from 16 to 19 with a floor before it and behind it.
+    place, fronts = np.array([[x, 8, 8] for x in (14, 16, 19, 22)]), columns("", "<", ">", "")
+    fronts[[0, 3], 5] = 1.0
+    walls = find_walls(place, fronts)
     for size, wide in ((2, False), (4, False), (8, False), (16, True)):
         count = 32 // size + 2
         found = too_wide(walls, size, (count, count, count)).reshape(count, count, count)
         assert found.any() == wide
         if wide:
-            # Cell 1 along each axis, after the empty layer the second along x, and what is read with it from below.
-            assert np.argwhere(found).tolist() == [[z, y, x] for z in (0, 1) for y in (0, 1) for x in (1, 2)]
+            # Cell 1 along each axis, after the empty layer the second along x, and what is read with both.
+            assert np.argwhere(found).tolist() == [[z, y, 1] for z in (0, 1) for y in (0, 1)]
+    # With a floor on one side alone, or a ceiling on the other, no face shows both.
+    for other in (0.0, [0, 0, 0, 0, 1, 0]):
+        fronts[3] = other
+        assert not too_wide(find_walls(place, fronts), 16, (4, 4, 4)).any()
 
 
 def test_lists_keep_where_cells_are_too_wide():
