@@ -4,7 +4,8 @@
 OUT/transfer/transfer.json             what is written here, and what the columns mean
 OUT/transfer/world.exr                 the world that was baked, coarsely: Blender's equirectangular map, upright
 OUT/transfer/<volume>/sky.exr          R G B what surfaces reflect of the sky, A what is seen of it: k × S a probe
-OUT/transfer/<volume>/suns0.exr …      R G B coefficient 0 … of suns from each direction: side × side a probe
+OUT/transfer/<volume>/suns0.exr …      R G B coefficient 0 … of suns from each direction: side × side a probe; or of V vectors
+OUT/transfer/vectors.exr               Y, float: what each direction takes of each vector, V × K, if suns are by vectors
 OUT/transfer/<volume>/seen.exr         Y how much of these suns the probe sees: side × side
 OUT/transfer/<volume>/lights.exr       R G B the bake's own lights: k × G, always in whole floats
 OUT/transfer/<volume>/local.exr        R G B lamps of 1 W at the sites: k × J
@@ -40,6 +41,7 @@ from ..storage.writing import write_text
 from ..techniques.base import ProbeGrid
 from ..techniques.transfer.columns import GROUP, SUNS, WORLD
 from ..techniques.transfer.data import Transfer, TransferGrid
+from ..techniques.transfer.vectors import strongest
 from . import flipbook
 from .exr import read_exr, require_image, write_exr
 from .names import folder_names
@@ -48,7 +50,7 @@ from .schema import RESTORE, SH_CONVENTION, TILES, require_tiles
 SCHEMA = "rtgi-transfer/2"
 FOLDER = "transfer"
 INDEX = f"{FOLDER}/transfer.json"
-WORLD_FILE = f"{FOLDER}/world.exr"
+WORLD_FILE, VECTORS_FILE = f"{FOLDER}/world.exr", f"{FOLDER}/vectors.exr"
 # The largest number that a half float holds.
 _LARGEST_HALF = 65504.0
 
@@ -56,7 +58,7 @@ _SIZE = whole(1, flipbook.MAX_SIDE)
 _SHEET = record({"cell": listing(_SIZE, 2), "tiles": TILES})
 _VOLUME = record({"name": text, "resolution": listing(_SIZE, 3), "sky": file_name, "sky_sheet": _SHEET, "suns": listing(file_name),
                   "seen": file_name, "suns_sheet": _SHEET},
-                 {"lights": file_name, "lights_sheet": _SHEET, "local": file_name, "local_sheet": _SHEET})
+                 {"lights": file_name, "lights_sheet": _SHEET, "local": file_name, "local_sheet": _SHEET, "vectors_sheet": _SHEET})
 _NUMBERS = listing(number(-1e30, 1e30), 3)
 _INDEX = record({
     "schema": text, "sh_convention": exactly(SH_CONVENTION), "order": whole(0, 8), "sky_order": whole(0, 8),
@@ -65,7 +67,7 @@ _INDEX = record({
     "world": record({"file": file_name, "size": listing(_SIZE, 2), "map_from_world": listing(_NUMBERS, 3), "description": text}),
     "sources": table(text, record({"strength": _NUMBERS, "rest": text}, {"group": text})),
     "half": flag, "half_error": number(0.0), "bytes_per_probe": whole(0), "surfaces": table(text, text),
-    "volumes": listing(_VOLUME)})
+    "volumes": listing(_VOLUME)}, {"vectors": record({"file": file_name, "count": whole(1, 1024), "error": number(0.0)})})
 
 
 def write_transfer(bundle, transfer: Transfer) -> list[str]:
@@ -74,12 +76,18 @@ def write_transfer(bundle, transfer: Transfer) -> list[str]:
     Raises BakeError for a disk that refuses, values that are not finite, and volumes larger than an image may be.
     """
     bundle, names, volumes, rounding = Path(bundle), [], [], _Rounding(transfer.half)
-    folders = folder_names([grid.grid.volume.name for grid in transfer.grids], reserved=["transfer.json", "world.exr"])
+    folders = folder_names([grid.grid.volume.name for grid in transfer.grids],
+                           reserved=["transfer.json", "world.exr", "vectors.exr"])
+    vectors = None
+    if 0 < transfer.sun_vectors < len(transfer.sun_directions):
+        vectors = strongest([grid.suns for grid in transfer.grids], transfer.sun_vectors)
     try:
         (bundle / FOLDER).mkdir(parents=True, exist_ok=True)
+        shared = {} if vectors is None else {"vectors": _write_vectors(bundle, vectors, transfer)}
+        names += [entry["file"] for entry in shared.values()]
         for folder, grid in zip(folders, transfer.grids, strict=True):
             (bundle / FOLDER / folder).mkdir(exist_ok=True)
-            entry, files = _write_volume(bundle, f"{FOLDER}/{folder}", grid, transfer, rounding)
+            entry, files = _write_volume(bundle, f"{FOLDER}/{folder}", grid, transfer, rounding, vectors)
             volumes.append(entry)
             names += files
         pixels = np.asarray(transfer.world.equirect, np.float32)
@@ -95,7 +103,7 @@ def write_transfer(bundle, transfer: Transfer) -> list[str]:
                       "map_from_world": np.asarray(transfer.world.map_from_world, np.float64).tolist(),
                       "description": transfer.world.description},
             "half": transfer.half, "half_error": rounding.error, "bytes_per_probe": transfer.bytes_per_probe,
-            "surfaces": transfer.surfaces, "sources": transfer.sources, "volumes": volumes}
+            "surfaces": transfer.surfaces, "sources": transfer.sources, "volumes": volumes, **shared}
         write_text(bundle / INDEX, json.dumps(index, indent=1, allow_nan=False) + "\n")
     except OSError as error:
         raise disk_error(bundle / FOLDER, error) from error
@@ -115,17 +123,40 @@ def read_transfer(bundle, grids: tuple[ProbeGrid, ...]) -> Transfer:
     if [(entry["name"], tuple(entry["resolution"])) for entry in entries] != [
             (grid.volume.name, tuple(grid.volume.resolution)) for grid in grids]:
         raise BakeError(f"{bundle / INDEX} does not belong to the bundle, its volumes are others", RESTORE)
-    world = index["world"]
+    world, vectors = index["world"], _read_vectors(bundle, index)
     width, height = world["size"]
     planes, _ = read_exr(require_inside(bundle, world["file"]), (height, width))
     equirect = np.stack([planes[letter][::-1] for letter in "RGB"], axis=-1).astype(np.float32)
     return Transfer(
-        tuple(_read_volume(bundle, entry, grid, index) for entry, grid in zip(entries, grids, strict=True)),
+        tuple(_read_volume(bundle, entry, grid, index, vectors) for entry, grid in zip(entries, grids, strict=True)),
         index["order"], index["sky_order"], index["sun_side"], index["sun_below"],
         tuple((light["name"], light["kind"]) for light in index["lights"]),
         np.array(index["sites"], np.float64).reshape(-1, 3),
         World(equirect, np.array(world["map_from_world"], np.float64), world["description"]),
-        index["surfaces"], index["sources"], index["half"])
+        index["surfaces"], index["sources"], index["half"], 0 if vectors is None else len(vectors))
+
+
+def _write_vectors(bundle: Path, vectors: np.ndarray, transfer: Transfer) -> dict:
+    """Write ``vectors`` (V, K) and return their entry of the index, with the relative RMS ``error`` of suns by them."""
+    write_exr(bundle / VECTORS_FILE, {"Y": vectors}, {"schema": SCHEMA, "kind": "vectors"})
+    off = power = 0.0
+    for grid in transfer.grids:
+        for plane in grid.suns:
+            off += float(np.square(plane @ vectors.T @ vectors - plane).sum(dtype=np.float64))
+            power += float(np.square(plane).sum(dtype=np.float64))
+    return {"file": VECTORS_FILE, "count": len(vectors), "error": float(np.sqrt(off / power)) if power else 0.0}
+
+
+def _read_vectors(bundle: Path, index: dict) -> np.ndarray | None:
+    entry = index.get("vectors")
+    if entry is None:
+        return None
+    path, directions = require_inside(bundle, entry["file"]), index["sun_side"] ** 2 * (1 + index["sun_below"])
+    planes, header = read_exr(path, (entry["count"], directions))
+    require_image(path, planes, "Y", header, {"schema": SCHEMA, "kind": "vectors"}, INDEX)
+    if not np.isfinite(planes["Y"]).all():
+        raise BakeError(f"{path} holds values that are not finite", RESTORE)
+    return planes["Y"].astype(np.float32)
 
 
 class _Rounding:
@@ -148,7 +179,8 @@ class _Rounding:
         return float(np.sqrt(self._off / self._all)) if self._all else 0.0
 
 
-def _write_volume(bundle: Path, folder: str, grid: TransferGrid, transfer: Transfer, rounding: _Rounding) -> tuple[dict, list[str]]:
+def _write_volume(bundle: Path, folder: str, grid: TransferGrid, transfer: Transfer, rounding: _Rounding,
+                  vectors: np.ndarray | None) -> tuple[dict, list[str]]:
     resolution = [int(n) for n in grid.grid.volume.resolution]
     side, k = transfer.sun_side, grid.coefficients
     names = [f"{folder}/{name}.exr" for name in ("sky", "seen", "lights", "local")]
@@ -156,6 +188,8 @@ def _write_volume(bundle: Path, folder: str, grid: TransferGrid, transfer: Trans
              "sky_sheet": _sheet_of(resolution, (k, grid.sky.shape[4])),
              "suns": [f"{folder}/suns{index}.exr" for index in range(k)],
              "seen": names[1], "suns_sheet": _sheet_of(resolution, (side * (1 + transfer.sun_below), side))}
+    if vectors is not None:
+        entry["vectors_sheet"] = _sheet_of(resolution, (1, len(vectors)))
     of_light = [("lights", grid.lights, names[2])] if grid.lights.shape[5] else []
     of_light += [("local", grid.local, names[3])] if grid.local.shape[5] else []
     for key, values, name in of_light:
@@ -172,17 +206,20 @@ def _write_volume(bundle: Path, folder: str, grid: TransferGrid, transfer: Trans
         written.append(name)
 
     write(entry["sky"], "sky", "RGBA", [rounding(part) for part in (*grid.bounce, grid.sky)], entry["sky_sheet"])
-    cell = entry["suns_sheet"]["cell"]
+    sheet, suns = entry["suns_sheet"], grid.suns
+    if vectors is not None:
+        sheet, suns = entry["vectors_sheet"], [part @ vectors.T for part in grid.suns]
     for index, name in enumerate(entry["suns"]):
-        write(name, f"suns{index}", "RGB", [rounding(part[..., index, :].reshape(*grid.shape, *cell)) for part in grid.suns],
-              entry["suns_sheet"])
+        planes = [rounding(part[..., index, :].reshape(*grid.shape, *sheet["cell"])) for part in suns]
+        write(name, f"suns{index}", "RGB", planes, sheet)
+    cell = entry["suns_sheet"]["cell"]
     write(entry["seen"], "seen", "Y", [rounding(grid.seen.reshape(*grid.shape, *cell))], entry["suns_sheet"])
     for key, values, name in of_light:
         write(name, key, "RGB", [part if key == "lights" else rounding(part) for part in values], entry[f"{key}_sheet"])
     return entry, written
 
 
-def _read_volume(bundle: Path, entry: dict, grid: ProbeGrid, index: dict) -> TransferGrid:
+def _read_volume(bundle: Path, entry: dict, grid: ProbeGrid, index: dict, vectors: np.ndarray | None) -> TransferGrid:
     def read(name, kind, letters, sheet) -> np.ndarray:
         """(letters, nz, ny, nx, rows, columns)."""
         path, tiles = require_inside(bundle, name), flipbook.Tiles(**sheet["tiles"])
@@ -200,7 +237,8 @@ def _read_volume(bundle: Path, entry: dict, grid: ProbeGrid, index: dict) -> Tra
     sky = read(entry["sky"], "sky", "RGBA", entry["sky_sheet"])
     suns = np.empty((3, *shape, k, int(np.prod(entry["suns_sheet"]["cell"]))), np.float32)
     for coefficient, name in enumerate(entry["suns"]):
-        suns[..., coefficient, :] = read(name, f"suns{coefficient}", "RGB", entry["suns_sheet"]).reshape(3, *shape, -1)
+        found = read(name, f"suns{coefficient}", "RGB", entry["suns_sheet" if vectors is None else "vectors_sheet"])
+        suns[..., coefficient, :] = found.reshape(3, *shape, -1) if vectors is None else found.reshape(3, *shape, -1) @ vectors
     seen = read(entry["seen"], "seen", "Y", entry["suns_sheet"])[0].reshape(*shape, -1)
     empty = np.zeros((3, *shape, k, 0), np.float32)
     lights, local = (read(entry[key], key, "RGB", entry[f"{key}_sheet"]) if key in entry else empty for key in ("lights", "local"))
@@ -238,7 +276,10 @@ def _check_index(index: dict, where: str) -> None:
     for place, entry in enumerate(index["volumes"]):
         if len(entry["suns"]) != (index["order"] + 1) ** 2:
             raise Refused(f"volumes[{place}].suns are {len(entry['suns'])} files")
-        for key in ("sky", "suns", "lights", "local"):
+        if ("vectors" in index) != ("vectors_sheet" in entry) or (
+                "vectors" in index and entry["vectors_sheet"]["cell"] != [1, index["vectors"]["count"]]):
+            raise Refused(f"volumes[{place}].vectors_sheet is not that of the vectors of suns")
+        for key in ("sky", "suns", "vectors", "lights", "local"):
             if f"{key}_sheet" in entry:
                 (nx, ny, nz), (rows, columns) = entry["resolution"], entry[f"{key}_sheet"]["cell"]
                 require_tiles(entry[f"{key}_sheet"]["tiles"], [nx * columns, ny * rows, nz], f"volumes[{place}].{key}_sheet")

@@ -14,6 +14,8 @@ from ..techniques.transfer.settings import TransferSettings
 from ..transport.surfaces.geometry import flatten
 
 _MIB = 1 << 20
+# Vectors of suns that a plan names beside the default.
+_FEW_VECTORS = 64
 # Numbers of a texel on the disk: coefficients and irradiance of three colours, whether it is known.
 _TEXEL = 3 * COUNT + 3 + 1
 
@@ -48,6 +50,8 @@ def _atlas(scene: Scene) -> tuple[str, ...]:
 def _transfer(scene: Scene, probes: int) -> str:
     settings, lights = TransferSettings(), len({WORLD, SUNS, *group_names(baked_part(scene))})
     suns = len(dome.directions(settings.sun_side, settings.sun_below))
-    each = stored_bytes(settings.order, settings.sky_order, suns, min(settings.sites, probes), lights, settings.half)
+    each, less = (stored_bytes(settings.order, settings.sky_order, suns, min(settings.sites, probes), lights, settings.half, few)
+                  for few in (settings.sun_vectors, _FEW_VECTORS))
     return (f"Radiance transfer (--technique transfer) would store {each / 1000:.1f} kB a probe at its defaults, at most "
-            f"{each * probes / _MIB:,.1f} MiB for these: they can then be relit without a bake")
+            f"{each * probes / _MIB:,.1f} MiB for these ({less / 1000:.1f} kB with --set sun_vectors={_FEW_VECTORS}): they can "
+            "then be relit without a bake")

@@ -18,6 +18,7 @@ from rtgi_addon.errors import BakeError, UsageError
 from rtgi_addon.exchange.bundle import read_bundle
 from rtgi_addon.exchange.exr import write_exr
 from rtgi_addon.exchange.sky_image import read_sky
+from rtgi_addon.exchange.transfer_files import read_transfer
 from rtgi_addon.jobs.bake import bake_scene
 from rtgi_addon.jobs.relight import LightChange, read_frames, relight_bundle
 from rtgi_addon.scene import PointLight, SunLight, World
@@ -64,6 +65,32 @@ def test_what_is_written_is_read_back_to_half_floats(bundle):
     assert np.array_equal(half.grids[0].lights, whole.grids[0].lights)
     index = json.loads((bundle / "transfer/transfer.json").read_text())
     assert 0 < index["half_error"] < 1e-3 and index["bytes_per_probe"] == 2 * (4 * 81 + 16 * 28 + 81) + 4 * 81
+
+
+def test_suns_by_vectors_are_what_the_table_is_nearest_to(bundle, tmp_path):
+    from rtgi_addon.blender.cli.info import BundleReport
+    path = bake_scene(yard(), "transfer", {**SETTINGS, "sun_vectors": 5}, tmp_path / "few", threads=1).out
+    content, index = read_bundle(path), json.loads((path / "transfer/transfer.json").read_text())
+    few, full = content.transfer_field.transfer, read_bundle(bundle).transfer_field.transfer
+    assert few.sun_vectors == 5 and index["vectors"]["count"] == 5
+    assert index["bytes_per_probe"] == 2 * (4 * 81 + 5 * 27 + 16 + 81) + 4 * 81
+    suns, table = few.grids[0].suns, full.grids[0].suns
+    assert suns.shape == table.shape and np.linalg.matrix_rank(suns.reshape(-1, 16), tol=1e-4 * np.abs(suns).max()) == 5
+    # No other five vectors are nearer (Eckart and Young, 1936).
+    least = np.linalg.svd(table.reshape(-1, 16).astype(np.float64), compute_uv=False)
+    assert index["vectors"]["error"] == pytest.approx(np.sqrt((least[5:] ** 2).sum() / (least**2).sum()), rel=0.01)
+    assert np.linalg.norm(suns - table) / np.linalg.norm(table) == pytest.approx(index["vectors"]["error"], rel=0.02)
+    for name in ("sky", "bounce", "seen", "lights", "local"):
+        assert np.array_equal(getattr(few.grids[0], name), getattr(full.grids[0], name))
+    assert "16 directions of the sun by 5 vectors (off by" in BundleReport(content).to_text()
+    relight_bundle(path, tmp_path / "out", LightChange(suns=((30.0, 50.0, 3.0),)))
+    relight_bundle(bundle, tmp_path / "table", LightChange(suns=((30.0, 50.0, 3.0),)))
+    assert not np.array_equal(sh_of(tmp_path / "out"), sh_of(tmp_path / "table"))
+    assert np.linalg.norm(sh_of(tmp_path / "out") - sh_of(tmp_path / "table")) < 0.1 * np.linalg.norm(sh_of(tmp_path / "table"))
+    index["vectors"]["count"] = 6
+    (path / "transfer/transfer.json").write_text(json.dumps(index))
+    with pytest.raises(BakeError, match="vectors_sheet is not that of the vectors"):
+        read_transfer(path, content.grids)
 
 
 def test_another_world_is_a_fresh_bake(bundle, tmp_path):

@@ -43,8 +43,10 @@ class BundleReport:
         suns = index["sun_side"] ** 2 * (1 + index["sun_below"])
         groups = [light["name"] for light in index["lights"] if light["kind"] == GROUP]
         rounding = f", rounded to 16 bits (off by {100.0 * index['half_error']:.2g} %)" if index["half"] else ""
+        vectors = index.get("vectors")
+        by = f" by {vectors['count']} vectors (off by {100.0 * vectors['error']:.2g} %)" if vectors else ""
         return [f"{index['bytes_per_probe']:,} bytes a probe{rounding}",
-                f"sky of order {index['sky_order']}, {suns} directions of the sun, {len(index['sites'])} lamp sites",
+                f"sky of order {index['sky_order']}, {suns} directions of the sun{by}, {len(index['sites'])} lamp sites",
                 f"groups of lights: {', '.join(groups) or 'none'}"]
 
     @property

@@ -69,6 +69,8 @@ def notes_on_transfer(transfer: EngineTransfer | None) -> list[str]:
         return []
     size = sum(table.nbytes for table in transfer.tables)
     notes = [f"relighting takes {size / 2**20:.1f} MiB of tables, {transfer.tables[0][:, 0].nbytes / 1000:.1f} kB a probe"]
+    if 0 < transfer.source.sun_vectors < len(transfer.source.sun_directions):
+        notes.append(f"suns are by {transfer.source.sun_vectors} vectors in the bundle, and by direction in the export")
     sites = len(transfer.source.sites)
     if sites:
         notes.append("lamps that the bake does not know are not followed in engines: the responses at "

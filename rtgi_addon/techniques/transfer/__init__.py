@@ -52,7 +52,7 @@ class TransferTechnique(Technique):
         held = frozenset(context.scene.lights[index].name for index in held_directly(context.scene.lights))
         transfer = Transfer(grids, settings.order, settings.sky_order, settings.sun_side, settings.sun_below,
                             tuple((column.name, column.kind) for column in columns), bake.site_positions, coarse(scene.world),
-                            surfaces_of(scene), sources_of(scene), settings.half)
+                            surfaces_of(scene), sources_of(scene), settings.half, settings.sun_vectors)
         stats = {"rays": int(bake.ray_count + bake.cache.count * bake.cache.rays), "texels": int(bake.cache.count),
                  "texel_size": float(bake.cache.layout.size), "bytes_per_probe": transfer.bytes_per_probe}
         field = TransferField(transfer, direct_lamps=held, params=asdict(settings), stats=stats)

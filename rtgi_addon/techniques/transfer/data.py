@@ -46,7 +46,7 @@ class Transfer:
     ``order`` of the probes, ``sky_order`` of skies, ``sun_side`` and ``sun_below`` of the suns' directions (numerics/dome.py);
     ``lights`` are (name, kind) of each column of the bake's own lights; ``sites`` (J, 3) in the world. ``world`` is the world that
     was baked, coarsely; ``surfaces`` are hashes by the names of what transfer depends on, ``sources`` what shone (follow.py);
-    ``half`` whether it is to be stored in 16 bits.
+    ``half`` whether it is to be stored in 16 bits, and ``sun_vectors`` by how many vectors suns are (0: direction by direction).
     """
 
     grids: tuple[TransferGrid, ...]
@@ -60,6 +60,7 @@ class Transfer:
     surfaces: dict[str, str] = field(default_factory=dict)
     sources: dict[str, dict] = field(default_factory=dict)
     half: bool = True
+    sun_vectors: int = 0
 
     @property
     def sun_directions(self) -> np.ndarray:
@@ -69,11 +70,12 @@ class Transfer:
     @property
     def bytes_per_probe(self) -> int:
         """What the transfer of one probe takes as it is stored, before compression."""
-        return stored_bytes(self.order, self.sky_order, len(self.sun_directions), len(self.sites), len(self.lights), self.half)
+        return stored_bytes(self.order, self.sky_order, len(self.sun_directions), len(self.sites), len(self.lights), self.half,
+                            self.sun_vectors)
 
 
-def stored_bytes(order: int, sky_order: int, suns: int, sites: int, lights: int, half: bool) -> int:
-    """What the transfer of one probe of an ``order`` takes as it is stored, before compression."""
+def stored_bytes(order: int, sky_order: int, suns: int, sites: int, lights: int, half: bool, vectors: int = 0) -> int:
+    """What the transfer of one probe of an ``order`` takes as it is stored, before compression and without what all share."""
     k, sky = (order + 1) ** 2, (sky_order + 1) ** 2
-    numbers = 4 * k * sky + suns * (3 * k + 1) + 3 * k * sites
+    numbers = 4 * k * sky + 3 * k * (vectors if 0 < vectors < suns else suns) + suns + 3 * k * sites
     return numbers * (2 if half else 4) + 4 * 3 * k * lights

@@ -21,6 +21,8 @@ class TransferSettings:
     sun_side: int = setting(18, "Sun Directions", "Side of the square grid of directions from which the sun is transferred: 18 "
                             "are 324 directions", "", 3, 64)
     sun_below: bool = setting(False, "Sun from Below", "Transfer suns from below the horizon as well, for twice the storage")
+    sun_vectors: int = setting(0, "Sun Vectors", "Store suns as products with so many vectors that all probes share: 64 take a "
+                               "fifth of 324 directions; 0 stores all", "", 0, 1024)
     sites: int = setting(32, "Lamp Sites", "Probes at which a lamp is transferred to all the others, for lamps that the bake does "
                          "not know", "", 0, 256)
     half: bool = setting(True, "Half Floats", "Store what sky, suns and lamp sites give in 16 bits")

@@ -245,6 +245,10 @@ SETTINGS: dict[str, str] = {
     "Sun from Below": "Sonne von unten",
     "Transfer suns from below the horizon as well, for twice the storage":
         "Auch Sonnen unter dem Horizont übertragen, für doppelten Speicher",
+    "Sun Vectors": "Sonnenvektoren",
+    "Store suns as products with so many vectors that all probes share: 64 take a fifth of 324 directions; 0 stores all":
+        "Sonnen als Produkte mit so vielen Vektoren speichern, die alle Sonden teilen: 64 brauchen ein Fünftel von 324 Richtungen; "
+        "0 speichert alle",
     "Lamp Sites": "Lampenorte",
     "Probes at which a lamp is transferred to all the others, for lamps that the bake does not know":
         "Sonden, bei denen eine Lampe an alle anderen übertragen wird, für Lampen, die das Gebackene nicht kennt",

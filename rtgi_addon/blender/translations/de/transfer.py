@@ -1,10 +1,10 @@
 """What is said about transfer and about relighting, and the labels of what changes light."""
 
 TRANSFER: dict[str, str] = {
-    "Radiance transfer (--technique transfer) would store {0} kB a probe at its defaults, at most {1} MiB for these: they can then "
-    "be relit without a bake":
+    "Radiance transfer (--technique transfer) would store {0} kB a probe at its defaults, at most {1} MiB for these ({2} kB with "
+    "--set sun_vectors={3}): they can then be relit without a bake":
         "Strahlungstransfer (--technique transfer) würde mit seinen Vorgaben {0} kB je Sonde speichern, höchstens {1} MiB für "
-        "diese: sie lassen sich dann ohne Backen neu beleuchten",
+        "diese ({2} kB mit --set sun_vectors={3}): sie lassen sich dann ohne Backen neu beleuchten",
     "Following the sun by rays": "Der Sonne wird mit Strahlen gefolgt",
     "{0} holds no transfer, it was relit": "{0} enthält keinen Transfer, es wurde neu beleuchtet",
     "give the bundle that it was relit from": "das Gebackene angeben, aus dem es neu beleuchtet wurde",
@@ -50,6 +50,8 @@ TRANSFER: dict[str, str] = {
     "transfer leaves medium {0} out: it takes {1} % of the light that crosses all of it, and gives light of its own":
         "Transfer lässt Medium {0} aus: es nimmt {1} % des Lichts, das es ganz durchquert, und gibt eigenes Licht",
     "relighting takes {0} MiB of tables, {1} kB a probe": "neu zu beleuchten braucht {0} MiB Tabellen, {1} kB je Sonde",
+    "suns are by {0} vectors in the bundle, and by direction in the export":
+        "Sonnen stehen im Gebackenen in {0} Vektoren, im Export nach Richtungen",
     "lamps that the bake does not know are not followed in engines: the responses at {0} lamp sites are left out":
         "Engines folgen keinen Lampen, die das Gebackene nicht kennt: die Antworten an {0} Lampenorten fehlen",
 }
