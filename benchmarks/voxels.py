@@ -1,10 +1,12 @@
 """Voxels: how long a scene takes into them, and how far cones and rays through them are from the path reference.
 
-    python benchmarks/voxels.py [--samples cornell_box …] [--points 300] [--noise 0.02] [--threads 2] [--only times|errors|walls]
+    python benchmarks/voxels.py [--samples cornell_box …] [--points 300] [--noise 0.02] [--threads 2]
+                                [--only times|errors|walls|cascades]
 
 *Times*: spheres of 245,760 triangles in a room, put into 64³ and 128³ voxels; seconds of processor time, the best of three.
 *Errors*: relative RMSE less the reference's own variance, bias and leak as in technique_errors.py, with processor seconds of the
-bake. *Walls*: two_rooms at voxels that its wall holds one and two of. Prints Markdown.
+bake. *Walls*: two_rooms at voxels that its wall holds one and two of. *Cascades*: atrium in one grid of 64 voxels, and in three of
+as many cells together and of 64 each. Prints Markdown.
 """
 
 import argparse
@@ -30,6 +32,8 @@ from rtgi_addon.transport.voxels import grid_around, voxelize  # noqa: E402
 SAMPLES = ("cornell_box", "two_rooms", "sun_window", "corridor_door_ajar", "atrium")
 RUNS = (("cone_tracing", {}), ("cone_tracing", {"cones": 6}), ("cone_tracing", {"light": "voxels"}),
         ("cone_tracing", {"light": "voxels", "bounces": 4}), ("voxel_march", {}), ("voxel_march", {"gather": "voxels"}))
+# One grid; three that are as large together, 64³ / 3 each; three of 64³.
+CASCADES = ({}, {"resolution": 44, "cascades": 3}, {"cascades": 3})
 # The wall between the rooms of two_rooms [m].
 WALL = 0.04
 
@@ -71,7 +75,7 @@ def main() -> None:
     parser.add_argument("--samples", nargs="+", default=SAMPLES)
     parser.add_argument("--points", type=int, default=300)
     parser.add_argument("--noise", type=float, default=0.02, help="relative noise of the reference, which is subtracted")
-    parser.add_argument("--only", choices=("times", "errors", "walls"))
+    parser.add_argument("--only", choices=("times", "errors", "walls", "cascades"))
     parser.add_argument("--threads", type=int, help="default: every core")
     options = parser.parse_args()
     head = ["| sample | settings | processor seconds, gather included | error | bias | leak |", "|---|---|---:|---:|---:|---:|"]
@@ -89,6 +93,12 @@ def main() -> None:
         for voxels in (1, 2):
             for name in ("cone_tracing", "voxel_march"):
                 print(_row(yard, "two_rooms", name, {"voxel_size": WALL / voxels}), flush=True)
+    if options.only in (None, "cascades"):
+        print("\n".join(["", *head]))
+        yard = _yard("atrium", options)
+        for name in ("cone_tracing", "voxel_march"):
+            for settings in CASCADES:
+                print(_row(yard, "atrium", name, settings), flush=True)
 
 
 if __name__ == "__main__":

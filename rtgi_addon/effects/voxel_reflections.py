@@ -19,6 +19,7 @@ from ..transport.context import LightContext
 from ..transport.parallel import chunks, parallel_for
 from ..transport.vectors import dot
 from ..transport.voxels import grid_around, voxelize
+from ..transport.voxels.cascades import by_cascade
 from ..transport.voxels.cones import specular_spread, trace_cones
 from .base import Effect, setting
 from .frame import Frame
@@ -90,7 +91,7 @@ def voxels_of(context: LightContext, field: Field | None, points: np.ndarray, se
         reach = _REACH * float((high - low).max()) or np.inf
         grid = grid_around(np.stack([np.maximum(bounds[0], low - reach), np.minimum(bounds[1], high + reach)]), settings.resolution)
         voxels = voxelize(context.geometry, context.surfaces, grid, context.threads)
-        context.kept[key] = ConeField(context, wanted, 0, voxels, Progress())
+        context.kept[key] = ConeField(context, wanted, 0, (voxels,), Progress())
     return context.kept[key]
 
 
@@ -108,11 +109,16 @@ def mirrored(voxels: VoxelField, surfaces: SeenSurfaces, settings: VoxelReflecti
     def work(i: int) -> np.ndarray:
         rows = spans[i]
         points, along, wide = surfaces.points[rows], directions[rows], spread[rows]
-        found = trace_cones(voxels.hierarchy, points, along, wide, surfaces.faces[rows], settings.step, settings.near)
-        radiance, open_ = found.radiance, np.flatnonzero(found.passed)
-        if open_.size:
-            radiance[open_] += found.passed[open_, None] * voxels.beyond(points[open_], along[open_], wide[open_])
-        return radiance
+
+        def seen_in(hierarchy, here):
+            start, way = points[here], along[here]
+            found = trace_cones(hierarchy, start, way, wide[here], surfaces.faces[rows][here], settings.step, settings.near)
+            radiance, open_ = found.radiance, np.flatnonzero(found.passed)
+            if open_.size:
+                radiance[open_] += found.passed[open_, None] * voxels.beyond(start[open_], way[open_], wide[here][open_])
+            return radiance
+
+        return by_cascade(voxels.hierarchies, points, seen_in)
 
     return np.concatenate(parallel_for(work, len(spans), threads))
 

@@ -28,7 +28,7 @@ def voxel_rows(hierarchy: Hierarchy, number: int, what: str, size: float = SIDE)
     index = np.flatnonzero(level.row)
     row, (_, ny, nx) = level.row[index], level.shape
     # The array begins with an empty layer.
-    place = np.stack([index % nx, index // nx % ny, index // (nx * ny)], axis=1) - 0.5
+    place = np.stack([index % nx, index // nx % ny, index // (nx * ny)], axis=1) - 0.5 + level.offset
     opacity = opacity_of(level)[row]
     rows = np.zeros((len(row), 4 + 4 * FACES), np.float32)
     rows[:, :3] = np.asarray(hierarchy.grid.corner) + hierarchy.grid.cell * level.size * place

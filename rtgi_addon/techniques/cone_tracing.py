@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import UsageError
+from ..transport.voxels.cascades import by_cascade
 from ..transport.voxels.cones import FEWEST, cone_set, irradiance, trace_cones
 from .base import setting
 from .voxels.field import AROUND, VoxelField
@@ -41,14 +42,18 @@ class ConeField(VoxelField):
 
     def gather(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """See VoxelField."""
-        settings = self.settings
-        return irradiance(self.hierarchy, points, normals, cone_set(settings.cones), self.beyond, settings.step, settings.near)
+        settings, cones = self.settings, cone_set(self.settings.cones)
+        return by_cascade(self.hierarchies, points, lambda hierarchy, rows: irradiance(
+            hierarchy, points[rows], normals[rows], cones, self.beyond, settings.step, settings.near))
 
     def look(self, points: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """See VoxelField."""
-        spread = np.full(len(points), _AROUND_SPREAD)
-        seen = trace_cones(self.hierarchy, points, directions, spread, None, self.settings.step, self.settings.near)
-        return seen.radiance + seen.passed[:, None] * self.beyond(points, directions, spread)
+        def seen_by(hierarchy, rows):
+            spread = np.full(len(rows), _AROUND_SPREAD)
+            seen = trace_cones(hierarchy, points[rows], directions[rows], spread, None, self.settings.step, self.settings.near)
+            return seen.radiance + seen.passed[:, None] * self.beyond(points[rows], directions[rows], spread)
+
+        return by_cascade(self.hierarchies, points, seen_by)
 
 
 class ConeTracing(VoxelTechnique):

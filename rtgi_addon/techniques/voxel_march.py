@@ -15,10 +15,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..errors import UsageError
 from ..numerics import sh
 from ..numerics.sampling import about, cosine_hemisphere, hash_u32, sobol_owen, unit_interval, wrapped
 from ..progress import Progress
-from ..transport.voxels.rays import march
+from ..transport.voxels.cascades import by_cascade
+from ..transport.voxels.rays import march_on
 from ..transport.voxels.sweeps import sweep
 from .base import setting
 from .voxels.field import VoxelField
@@ -83,11 +85,17 @@ class MarchField(VoxelField):
 
     def _along(self, points: np.ndarray, directions: np.ndarray, normals: np.ndarray | None) -> np.ndarray:
         first_hit = OCCUPIED if self.settings.opacity == FIRST_HIT else None
-        seen = march(self.hierarchy, points, directions, normals, first_hit=first_hit)
-        radiance, rows = seen.radiance, np.flatnonzero(seen.passed)
-        if rows.size:
-            radiance[rows] += seen.passed[rows, None] * self.beyond(points[rows], directions[rows], np.zeros(len(rows)))
-        return radiance
+
+        def seen_by(hierarchy, chosen):
+            from_here, way = points[chosen], directions[chosen]
+            through = self.hierarchies[self.hierarchies.index(hierarchy):]
+            seen = march_on(through, from_here, way, None if normals is None else normals[chosen], first_hit)
+            radiance, rows = seen.radiance, np.flatnonzero(seen.passed)
+            if rows.size:
+                radiance[rows] += seen.passed[rows, None] * self.beyond(from_here[rows], way[rows], np.zeros(len(rows)))
+            return radiance
+
+        return by_cascade(self.hierarchies, points, seen_by)
 
 
 class VoxelMarch(VoxelTechnique):
@@ -100,6 +108,11 @@ class VoxelMarch(VoxelTechnique):
     tolerance = 0.1
     presets = {"draft": {"resolution": 32, "rays": 16}, "preview": {"resolution": 64, "rays": 64},
                "final": {"resolution": 128, "rays": 256}}
+
+    def check(self, settings: MarchSettings) -> None:
+        """See VoxelTechnique."""
+        if settings.cascades > 1 and settings.gather == CELLS:
+            raise UsageError(f"gather is {CELLS} and cascades is {settings.cascades}", "gather from receivers, or use one grid")
 
     def sweep(self) -> tuple[MarchSettings, ...]:
         """Resolutions, from cells, and light that the voxels send each other."""

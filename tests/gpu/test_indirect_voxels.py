@@ -120,6 +120,14 @@ def test_cells_that_hand_on_light_are_shown_through_probes(indirect):
     assert "indirect_probes" in made.samplers
 
 
+def test_nested_grids_are_shown_through_probes(indirect):
+    scene = replace(ROOMS, volumes=(build.volume(resolution=(2, 2, 2), center=(-1.0, 0.0, -0.7), half_size=0.3),))
+    field = bake("cone_tracing", scene, cascades=2, resolution=60, reach=20.0, cones=6, order=1)
+    assert len(field.cascades) == 2
+    made = indirect.make_indirect(field, scene)
+    assert "indirect_probes" in made.samplers and made.moved is None
+
+
 def moved(scene, offset):
     lights = tuple(replace(light, position_world=light.position_world + np.float32([offset, 0, 0])) for light in scene.lights)
     return replace(scene, lights=lights)

@@ -20,6 +20,8 @@ from .parts import ONE, box, brightness, grey, moved, quad, receivers, rms_chang
 VOXEL = 0.1
 # Frames of something that moves, and by how much of a voxel in each.
 FRAMES, CREEP = 8, 0.125
+# Side of the finer voxels where there are two grids [m].
+_FINEST = 0.04
 # Paths of the yardstick.
 _PATHS, _SEED = 1024, 7
 # Other cells than voxels have: what each technique is swept over.
@@ -69,6 +71,21 @@ def _motion(bench: Bench) -> list[Sample]:
     return [Sample(f"{FRAMES} frames of {CREEP:g} voxels", flicker(np.array(frames)), built, field)]
 
 
+def _border(bench: Bench) -> list[Sample]:
+    """Two nested grids about a probe volume that is carried along a floor: the border of the finer one crosses the receivers."""
+    x, y = np.meshgrid(np.linspace(-0.9, 0.9, 25), np.linspace(-0.5, 0.5, 3))
+    points = np.stack([x.ravel(), y.ravel() - 0.4, np.full(x.size, -0.999)], axis=1).astype(np.float32)
+    points = points[(np.abs(points[:, 1]) > 0.45) | (points[:, 0] < -0.15)]
+    normals = np.tile(np.float32([0, 0, 1]), (len(points), 1))
+    frames, field, built = [], None, None
+    for frame in range(FRAMES):
+        along = -0.3 + 0.5 * _FINEST * frame
+        built = replace(room_with_block(), volumes=(volume((along - 0.2, -0.3, -0.95), (along + 0.2, 0.1, -0.55), (4, 4, 4)),))
+        field = bench.bake(built, **{**_quick(bench), "voxel_size": _FINEST, "cascades": 2, "reach": 20.0, "rays": 256})
+        frames.append(brightness(field, points, normals))
+    return [Sample(f"{FRAMES} frames of half a voxel", flicker(np.array(frames)), built, field)]
+
+
 def _pole(bench: Bench) -> list[Sample]:
     """A floor under a grey sky with a pole on it: what the pole keeps from the floor around it, in parts of the light there."""
     samples = []
@@ -115,6 +132,9 @@ CASES = (
     Case("voxel-motion", "light flickers as something moves by less than a voxel", "a room with a block that glides",
          "RMS over eight frames of what is left after a straight line in time, over the mean", "an eighth of a voxel a frame",
          0.005, _motion, SIX),
+    Case("voxel-cascades", "light steps where the border of a finer grid passes", "a room with a block, two grids on the move",
+         "RMS over eight frames of what is left after a straight line in time, over the mean", "half a finest voxel a frame",
+         0.005, _border, SIX),
     Case("voxel-pole", "what is thinner than a voxel hides too much or too little", "a pole on a floor under a grey sky",
          "deviation of the irradiance around its foot from path tracing", "the pole's width", 0.02, _pole, SIX),
     Case("voxel-corner", "a corner within a voxel is lost", "a black floor at a glowing wall",

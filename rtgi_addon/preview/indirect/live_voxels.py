@@ -29,8 +29,9 @@ _SEED = 0
 
 
 def tables_of_field(field: VoxelField, samples: int | None) -> Tables:
-    """The voxels of ``field``; where receivers read what arrives in them, harmonics of all, its probes."""
-    return grid_tables(field) if getattr(field.settings, "gather", None) == CELLS else voxel_tables(field, samples)
+    """The voxels of ``field``; where receivers read what arrives in them, harmonics of all, or nested grids, its probes."""
+    by_probes = getattr(field.settings, "gather", None) == CELLS or len(field.cascades) > 1
+    return grid_tables(field) if by_probes else voxel_tables(field, samples)
 
 
 class LiveVoxelsLight(RelitLight):
@@ -84,8 +85,8 @@ class LiveVoxelsLight(RelitLight):
 
     def _compare(self) -> None:
         self._moved = self._followed = None
-        # What arrives in cells is shown through probes, which know no surfaces.
-        if self.field is not None and getattr(self._settings, "gather", None) != CELLS:
+        # What arrives in cells, and in nested grids, is shown through probes, which know no surfaces.
+        if self.field is not None and getattr(self._settings, "gather", None) != CELLS and len(self.field.cascades) == 1:
             moved = moved_since(self.field.context.scene, self._drawn)
             self._moved = moved if moved.any else None
 

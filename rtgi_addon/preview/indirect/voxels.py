@@ -49,9 +49,9 @@ class LitVoxels:
 
 
 def voxel_tables(field: VoxelField, samples: int | None = None) -> Tables:
-    """The voxels of ``field``, read as it does. With ``samples`` a receiver follows no more rays, or about FRAME_CONES cones, those
-    of its own turn, for all."""
-    return tables_of(LitVoxels(field.context, field.settings, field.seed, field.hierarchy), samples)
+    """The voxels of ``field``, read as it does; of nested grids the outermost alone. With ``samples`` a receiver follows no more
+    rays, or about FRAME_CONES cones, those of its own turn, for all."""
+    return tables_of(LitVoxels(field.context, field.settings, field.seed, field.hierarchies[-1]), samples)
 
 
 def tables_of(lit: LitVoxels, samples: int | None = None) -> Tables:

@@ -15,7 +15,8 @@ from ...scene import Omission, Scene
 from ...transport.context import LightContext
 from ...transport.parallel import chunks, parallel_for
 from ...transport.paths.sources import Sources
-from ...transport.voxels import Voxels, voxelize
+from ...transport.voxels import Voxels, holds_geometry, voxelize
+from ...transport.voxels.cascades import by_cascade, clipmap
 from ...transport.voxels.hierarchy import Hierarchy, build_hierarchy
 from ...transport.voxels.rays import box_span
 from ..base import Field, ProbeGrid, all_captured
@@ -25,8 +26,8 @@ from ..lattice.resample import resample
 from ..lpv.leaks import causes_of_cells
 from ..unfollowed import quoted, surfaces_of_maps
 from .beyond import goes_on
-from .lighting import VoxelLight
-from .place import beyond_grid, place_grid, thin_walls
+from .lighting import light_voxels
+from .place import beyond_grid, place_grids, thin_walls
 from .settings import MAPS, SURFACES, VoxelSettings
 from .shipped import ShippedVoxels, shipped
 
@@ -41,20 +42,25 @@ _VOXELIZED = 0.1
 
 
 class VoxelField(Field):
-    """Light gathered from the ``hierarchy`` of lit ``voxels`` of the scene of ``context``; subclasses say how."""
+    """Light gathered from the lit voxels of the scene of ``context``; subclasses say how. ``cascades`` are those of nested grids,
+    finest first; ``voxels`` the first of them, ``hierarchies`` what receivers in each read, ``hierarchy`` the first."""
 
-    def __init__(self, context: LightContext, settings: VoxelSettings, seed: int, voxels: Voxels, progress: Progress):
-        self.context, self.settings, self.seed, self.voxels = context, settings, seed, voxels
+    def __init__(self, context: LightContext, settings: VoxelSettings, seed: int, cascades: tuple[Voxels, ...], progress: Progress):
+        self.context, self.settings, self.seed = context, settings, seed
+        self.cascades, voxels = cascades, cascades[0]
+        self.voxels = voxels
         self.params, self._grids = asdict(settings), None
-        self.goes_on = goes_on(context, voxels.grid)
+        self.goes_on = goes_on(context, cascades[-1].grid)
         self._sources = Sources(context)
         self._bright = [context.lamps.count] if context.environment.bright.count else []
         self._lamp_light = LampLight(context, False, LAMP_SAMPLES, seed)
         self.direct_lamps = self._lamp_light.names
         # By point of ``voxels.seen``, so that voxels can be lit anew without some of what is in them.
-        self.leaving = VoxelLight(context, voxels, settings, seed).leaving(self._sky, progress)
-        self.hierarchy: Hierarchy = build_hierarchy(voxels, voxels.by_face(self.leaving))
-        self.stats = {"rays": 0, "voxels": len(voxels.cells), "voxel_size": voxels.grid.cell,
+        leaving = light_voxels(context, cascades, settings, seed, self._sky, progress)
+        self.leaving = leaving[0]
+        self.hierarchies = hierarchies_of(cascades, leaving)
+        self.hierarchy: Hierarchy = self.hierarchies[0]
+        self.stats = {"rays": 0, "voxels": sum(len(part.cells) for part in cascades), "voxel_size": voxels.grid.cell,
                       "grid": list(voxels.grid.resolution)}
         self.notes = tuple(thin_walls(context, voxels))
         self.omissions = tuple(self._omissions())
@@ -66,10 +72,13 @@ class VoxelField(Field):
         Cancelled."""
         progress.stage("voxels")
         progress.step(0.0, "putting the scene into voxels")
-        grid = place_grid(context.scene, np.array(context.geometry.bounds(), np.float64), settings)
-        voxels = voxelize(context.geometry, context.surfaces, grid, context.threads,
-                          meet=None if kernels is None else kernels.voxel_crossings)
-        return cls(context, settings, seed, voxels, progress.span(_VOXELIZED, 1.0))
+        grids = place_grids(context.scene, np.array(context.geometry.bounds(), np.float64), settings)
+        meet = None if kernels is None else kernels.voxel_crossings
+        # What holds nothing is left out; the outermost, which all others lie in, must hold something.
+        held = [grid for grid in grids[:-1] if holds_geometry(context.geometry, grid)]
+        cascades = tuple(voxelize(context.geometry, context.surfaces, grid, context.threads, meet=meet)
+                         for grid in (*held, grids[-1]))
+        return cls(context, settings, seed, cascades, progress.span(_VOXELIZED, 1.0))
 
     @abstractmethod
     def gather(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
@@ -123,7 +132,7 @@ class VoxelField(Field):
                 radiance = radiance + self._sky(about(directions, local))
             radiance = radiance * np.float32(1.0 / (1 + RING))
         if self.goes_on:
-            grid = self.voxels.grid
+            grid = self.cascades[-1].grid
             _, leave = box_span(grid, grid.cells_of(points), np.asarray(directions, np.float64))
             way = np.maximum(np.nan_to_num(leave, posinf=0.0, neginf=0.0), 0.0) * grid.cell
             exits = (points + directions * way[:, None]).astype(np.float32)
@@ -143,7 +152,11 @@ class VoxelField(Field):
 
     def leak_causes(self, context, points: np.ndarray, normals: np.ndarray, excess: np.ndarray) -> np.ndarray:
         """See Field."""
-        return causes_of_cells(context, np.full(len(points), self.voxels.grid.cell), points, normals)
+        return causes_of_cells(context, self._cells_at(points), points, normals)
+
+    def _cells_at(self, points: np.ndarray) -> np.ndarray:
+        """Side (n,) of the voxels that ``points`` (n, 3) lie in."""
+        return by_cascade(self.hierarchies, points, lambda hierarchy, rows: np.full(len(rows), hierarchy.grid.cell))
 
     def grids(self) -> tuple[ProbeGrid, ...]:
         """The field on the scene's volumes, once."""
@@ -153,13 +166,13 @@ class VoxelField(Field):
                                    radiance_sh=partial(self.radiance_sh, order=order))
         return self._grids
 
-    def lit_voxels(self) -> ShippedVoxels:
+    def lit_voxels(self) -> ShippedVoxels | None:
         """See Field."""
-        return shipped(self)
+        return None if len(self.cascades) > 1 else shipped(self)
 
     def relight(self, scene: Scene, progress: Progress | None = None) -> "VoxelField":
         """The field under the lamps and world of ``scene``: the voxels stay. Raises BakeError if geometry or materials differ."""
-        return type(self)(self.context.relit(scene), self.settings, self.seed, self.voxels, progress or Progress())
+        return type(self)(self.context.relit(scene), self.settings, self.seed, self.cascades, progress or Progress())
 
     @property
     def live_settings(self) -> VoxelSettings:
@@ -167,16 +180,23 @@ class VoxelField(Field):
         return self.settings
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """The grid as JSON text, and of the voxels that hold surfaces the flat indices, the opacity along the axes, and optical
-        depth with that times radiance by face, as Level has them."""
-        grid, finest = self.voxels.grid, self.hierarchy.levels[0]
-        text = json.dumps({"corner": grid.corner, "cell": grid.cell, "resolution": grid.resolution})
-        return {"grid": np.array(text), "cells": self.voxels.cells, "opacity": self.voxels.opacity, "depth": finest.depth[1:],
-                "glow": finest.glow.reshape(-1, 6, 3)[1:]}
+        """Of every grid, numbered but for the finest: itself as JSON text, and of the voxels that hold surfaces the flat indices,
+        the opacity along the axes, and optical depth with that times radiance by face, as Level has them."""
+        result = {}
+        for number, (voxels, hierarchy) in enumerate(zip(self.cascades, self.hierarchies, strict=True)):
+            grid, finest = voxels.grid, hierarchy.levels[0]
+            text = json.dumps({"corner": grid.corner, "cell": grid.cell, "resolution": grid.resolution})
+            parts = {"grid": np.array(text), "cells": voxels.cells, "opacity": voxels.opacity, "depth": finest.depth[1:],
+                     "glow": finest.glow.reshape(-1, 6, 3)[1:]}
+            result.update({name if number == 0 else f"{name}_{number}": array for name, array in parts.items()})
+        return result
 
     def _omissions(self) -> Iterator[Omission]:
         scene = self.context.scene
-        yield from beyond_grid(self.technique, self.context, self.voxels.grid)
+        if len(self.cascades) > 1:
+            yield Omission(f"{self.technique} has voxels in {len(self.cascades)} cascades, and bundles and exports hold one grid: "
+                           f"their light goes along in probes alone")
+        yield from beyond_grid(self.technique, self.context, self.cascades[-1].grid)
         limited = tuple(light.name for light in scene.lights if light.max_bounces is not None)
         if limited and self.settings.light != SURFACES:
             yield Omission(f"{self.technique} reflects the light of {quoted(limited)} on, beyond the bounces that it is limited to",
@@ -184,3 +204,12 @@ class VoxelField(Field):
         if self.settings.light == MAPS:
             yield from surfaces_of_maps(self.technique, self.context)
         yield from all_captured(self.technique, scene.volumes)
+
+
+def hierarchies_of(cascades: tuple[Voxels, ...], leaving: list[np.ndarray]) -> tuple[Hierarchy, ...]:
+    """What receivers in each of nested grids read where ``leaving`` (e, 3) leaves what their voxels show."""
+    shown = [voxels.by_face(light) for voxels, light in zip(cascades, leaving, strict=True)]
+    finest = [build_hierarchy(voxels, light, None if index == len(cascades) - 1 else 1)
+              for index, (voxels, light) in enumerate(zip(cascades, shown, strict=True))]
+    afar = [build_hierarchy(voxels, light, 1, afar=True) for voxels, light in zip(cascades[1:], shown[1:], strict=True)]
+    return clipmap(tuple(finest), tuple(afar))

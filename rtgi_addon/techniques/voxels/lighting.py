@@ -21,7 +21,7 @@ from ...transport.parallel import CHUNK, chunks, parallel_for
 from ...transport.paths.sources import Sources
 from ...transport.vectors import dot
 from ...transport.views.reflective_shadow_map import capture
-from ...transport.voxels import Voxels
+from ...transport.voxels import VoxelGrid, Voxels
 from ...transport.voxels.grid import FACES
 from ...transport.voxels.hierarchy import build_hierarchy
 from ...transport.voxels.injection import inject
@@ -41,8 +41,51 @@ _MOST_KEPT = 0.95
 _LAMPS = 0.3
 
 
+def light_voxels(context: LightContext, cascades: tuple[Voxels, ...], settings: VoxelSettings, seed: int, beyond,
+                 progress: Progress) -> list[np.ndarray]:
+    """Radiance (e, 3) float32 that leaves what the faces of the voxels of each of nested grids show, by point of ``Voxels.seen``;
+    ``beyond``(directions (k, 3)) is that (k, 3) of what lies outside them all. Raises Cancelled, BakeError."""
+    parts, direct = [VoxelLight(context, voxels, settings, seed) for voxels in cascades], []
+    shares = [progress.span(index / len(parts), (index + 1) / len(parts)) for index in range(len(parts))]
+    if settings.light == SURFACES:
+        return [part.direct(share.span(0.0, _LAMPS)) + part.cached(share.span(_LAMPS, 1.0))
+                for part, share in zip(parts, shares, strict=True)]
+    for index, part in enumerate(parts):
+        direct.append(part.direct(progress.span(_LAMPS * index / len(parts), _LAMPS * (index + 1) / len(parts))))
+    return _bounced(parts, settings, direct, beyond, progress.span(_LAMPS, 1.0))
+
+
+def _bounced(parts: "list[VoxelLight]", settings: VoxelSettings, direct: list[np.ndarray], beyond,
+             progress: Progress) -> list[np.ndarray]:
+    """What leaves of ``direct`` (e, 3), of what lies beyond, and of what voxels then send each other, grid by grid."""
+    steps = [beyond] if np.any(beyond(fibonacci_sphere(SWEEPS))) else []
+    steps += [_nothing] * settings.bounces
+    # Unlit voxels hide the sky from each other; then each reflects what the last one sent on.
+    total = direct
+    last = direct if len(steps) == settings.bounces else [np.zeros_like(light) for light in direct]
+    for number, outside in enumerate(steps):
+        found, around = [], None
+        # From the outermost in: what comes through the border of a grid has come through the next.
+        for index in reversed(range(len(parts))):
+            done = number + (len(parts) - 1 - index) / len(parts)
+            share = progress.span(done / len(steps), (done + 1 / len(parts)) / len(steps))
+            light, swept = parts[index].swept(last[index], outside, around, share)
+            found.insert(0, swept)
+            around = None if index == 0 else (parts[index].grid, light)
+        if outside is beyond:
+            total = last = [light + new for light, new in zip(direct, found, strict=True)]
+            continue
+        total = [light + new for light, new in zip(total, found, strict=True)]
+        if number == len(steps) - 1 and settings.further_bounces:
+            # The outermost grid knows all that the light meets.
+            more = parts[-1].still_to_come(last[-1], found[-1])
+            total = [light + new * more for light, new in zip(total, found, strict=True)]
+        last = found
+    return total
+
+
 class VoxelLight:
-    """The light on ``voxels`` of the scene of ``context``."""
+    """The light on ``voxels`` of the scene of ``context``, of one grid."""
 
     def __init__(self, context: LightContext, voxels: Voxels, settings: VoxelSettings, seed: int):
         self._context, self._voxels, self._settings, self._seed = context, voxels, settings, seed
@@ -50,38 +93,32 @@ class VoxelLight:
         # Sources that shadow rays are sent to: where maps know lamps, what follows them is bright sky.
         self._first = context.lamps.count if settings.light == MAPS else 0
 
-    def leaving(self, beyond, progress: Progress) -> np.ndarray:
-        """Radiance (e, 3) float32 that leaves what the voxels' faces show, by point of ``Voxels.seen``; ``beyond``(directions (k,
-        3)) is that (k, 3) of what lies outside them. Raises Cancelled, BakeError."""
-        direct = self._by_chunks(self._direct, progress.span(0.0, _LAMPS), "lamps on voxels")
-        if self._settings.light == MAPS:
-            direct += self._mapped(progress)
-        rest = progress.span(_LAMPS, 1.0)
-        if self._settings.light == SURFACES:
-            return direct + self._cached(rest)
-        return self._bounced(direct, beyond, rest)
+    @property
+    def grid(self) -> VoxelGrid:
+        """Of the voxels."""
+        return self._voxels.grid
 
-    def _bounced(self, direct: np.ndarray, beyond, progress: Progress) -> np.ndarray:
-        """What leaves of ``direct`` (e, 3), of what lies beyond, and of what voxels then send each other."""
-        steps = [beyond] if np.any(beyond(fibonacci_sphere(SWEEPS))) else []
-        steps += [_nothing] * self._settings.bounces
-        # Unlit voxels hide the sky from each other; then each reflects what the last one sent on.
-        total, last = direct, np.zeros_like(direct) if len(steps) > self._settings.bounces else direct
-        for number, outside in enumerate(steps):
-            share = progress.span(number / len(steps), (number + 1) / len(steps))
-            lit = build_hierarchy(self._voxels, self._voxels.by_face(last))
-            light = sweep(lit, SWEEPS, 2, outside, self._context.threads, share)
-            found = self._by_chunks(lambda rows, light=light: self._swept(light, rows), share, "light between voxels")
-            if outside is beyond:
-                total = last = direct + found
-                continue
-            total = total + found
-            if number == len(steps) - 1 and self._settings.further_bounces:
-                total += found * self._still_to_come(last, found)
-            last = found
-        return total
+    def direct(self, progress: Progress) -> np.ndarray:
+        """Radiance (e, 3) that leaves of the light of lamps, bright sky and what is emitted. Raises Cancelled, BakeError."""
+        direct = self._by_chunks(self._direct, progress, "lamps on voxels")
+        return direct + self._mapped(progress) if self._settings.light == MAPS else direct
 
-    def _still_to_come(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    def swept(self, last: np.ndarray, beyond, around: tuple[VoxelGrid, np.ndarray] | None,
+              progress: Progress) -> tuple[np.ndarray, np.ndarray]:
+        """What arrives in the cells (nz, ny, nx, 9, 3) of what leaves what they show, ``last`` (e, 3), and of what lies beyond the
+        grid, or what arrives in those of the one ``around`` it; and what leaves of that (e, 3)."""
+        voxels, inflow = self._voxels, None
+        lit = build_hierarchy(voxels, voxels.by_face(last), levels=1)
+        if around is not None:
+            inflow = np.zeros((*self.grid.shape, *around[1].shape[3:]), np.float32)
+            inside = np.ones(self.grid.shape, bool)
+            inside[1:-1, 1:-1, 1:-1] = False
+            border = np.flatnonzero(inside)
+            inflow.reshape(self.grid.count, *inflow.shape[3:])[border] = sample_cells(*around, self.grid.centers_of(border))
+        light = sweep(lit, SWEEPS, 2, beyond, self._context.threads, progress, inflow)
+        return light, self._by_chunks(lambda rows: self._swept(light, rows), progress, "light between voxels")
+
+    def still_to_come(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
         """How much of ``after`` (e, 3), which a bounce made of ``before`` (e, 3), all further ones add (3,): each keeps the share
         of the light that this one did. M. Cohen et al., "A Progressive Refinement Approach to Fast Radiosity Image Generation",
         SIGGRAPH 1988, have such an ambient term of all surfaces' mean reflectance; this also knows what escapes."""
@@ -149,7 +186,7 @@ class VoxelLight:
         share = np.bincount(seen.face, seen.weight, shown.shape[0] * FACES)
         return (shown.reshape(-1, 3) / np.maximum(share, np.finfo(np.float32).tiny)[:, None]).astype(np.float32)[seen.face]
 
-    def _cached(self, progress: Progress) -> np.ndarray:
+    def cached(self, progress: Progress) -> np.ndarray:
         """What the surface cache knows beside that (e, 3)."""
         context, seen, grid = self._context, self._voxels.seen, self._voxels.grid
         radius = 0.5 * float(np.linalg.norm(grid.high - grid.corner))

@@ -10,8 +10,9 @@ from ...scene import Omission, Scene
 from ...transport.context import LightContext
 from ...transport.rays.tracer import offset_origins
 from ...transport.vectors import dot
-from ...transport.voxels import VoxelGrid, Voxels, grid_around
-from .settings import VoxelSettings
+from ...transport.voxels import VoxelGrid, Voxels
+from ...transport.voxels.cascades import FEWEST, nested
+from .settings import CAMERA, VoxelSettings
 
 # Points whose walls are measured, and the share of them that must be thin to be worth a word.
 _PROBED, _WORTH = 20000, 0.005
@@ -19,9 +20,9 @@ _PROBED, _WORTH = 20000, 0.005
 _SAME = 0.01
 
 
-def place_grid(scene: Scene, bounds: np.ndarray, settings: VoxelSettings) -> VoxelGrid:
-    """The grid around the probe volumes of ``scene`` and the geometry about them, whose ``bounds`` are (2, 3). Raises BakeError for
-    no geometry there, and for one beyond limits."""
+def place_grids(scene: Scene, bounds: np.ndarray, settings: VoxelSettings) -> tuple[VoxelGrid, ...]:
+    """The grid around the probe volumes of ``scene`` and the geometry about them, whose ``bounds`` are (2, 3), and those within it,
+    finest first. Raises BakeError for no geometry there, for grids beyond limits, and for no camera where they lie about one."""
     corners = np.concatenate([box_corners(volume.world_from_local) for volume in scene.volumes])
     low, high = corners.min(axis=0), corners.max(axis=0)
     margin = settings.reach * float((high - low).max())
@@ -29,7 +30,17 @@ def place_grid(scene: Scene, bounds: np.ndarray, settings: VoxelSettings) -> Vox
     if np.any(box[0] > box[1]):
         raise BakeError(f"the voxel grid holds no geometry: nothing lies within {margin:.3g} m of the probe volumes",
                         "raise reach, or place the probe volumes where surfaces are")
-    return grid_around(box, settings.resolution, settings.voxel_size)
+    center = 0.5 * (low + high)
+    if settings.cascades > 1 and settings.center == CAMERA:
+        if not scene.cameras:
+            raise BakeError("the cascades of the voxel grid lie about the scene's camera, and it has none",
+                            "add a camera, or set center to volumes")
+        center = np.asarray(scene.cameras[0].world_from_camera, np.float64)[:3, 3]
+    grids = nested(box, settings.resolution, settings.cascades, center, settings.voxel_size)
+    if len(grids) > 1 and min(grids[0].resolution) < FEWEST:
+        raise BakeError(f"cascades of {' x '.join(str(count) for count in grids[0].resolution)} voxels leave nothing between their "
+                        f"borders", f"raise resolution until there are {FEWEST} along each side, or set cascades to 1")
+    return grids
 
 
 def thin_walls(context: LightContext, voxels: Voxels) -> Iterator[str]:

@@ -6,6 +6,8 @@ from ..base import setting
 
 # Where the voxels' light comes from.
 SURFACES, VOXELS, MAPS = "surfaces", "voxels", "shadow maps"
+# What nested grids lie about.
+VOLUMES, CAMERA = "volumes", "camera"
 
 
 @dataclass(frozen=True)
@@ -18,6 +20,10 @@ class VoxelSettings:
                                        "resolution", "m", 1e-6, 1e6)
     reach: float = setting(0.5, "Reach", "How far beyond the probe volumes the grid reaches for surfaces, as a share of the "
                            "volumes' longest side", "", 0.0, 100.0)
+    cascades: int = setting(1, "Cascades", "Grids about one place, each half as large as the one around it, in voxels half as "
+                            "large: finer there for as many voxels more", "", 1, 6)
+    center: str = setting(VOLUMES, "About", "What cascades lie about: the middle of the probe volumes, or the scene's camera",
+                          choices=(VOLUMES, CAMERA))
     light: str = setting(SURFACES, "Light on Voxels", "All light on surfaces, traced by rays, or the light of lamps, by shadow "
                          "rays or from their reflective shadow maps, and what voxels then send each other",
                          choices=(SURFACES, VOXELS, MAPS))

@@ -6,6 +6,6 @@ the cells, `cones` the hierarchy.
 """
 
 from .grid import VoxelGrid, grid_around
-from .voxelize import Voxels, voxelize
+from .voxelize import Voxels, holds_geometry, voxelize
 
-__all__ = ["VoxelGrid", "Voxels", "grid_around", "voxelize"]
+__all__ = ["VoxelGrid", "Voxels", "grid_around", "holds_geometry", "voxelize"]

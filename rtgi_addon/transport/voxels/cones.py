@@ -18,8 +18,9 @@ import numpy as np
 from ...numerics import sh
 from ...numerics.sampling import GOLDEN_FRACTION, frame
 from ..vectors import dot
+from .cascades import coarsest_needed
 from .hierarchy import Hierarchy, Level
-from .rays import SPENT, box_span, march
+from .rays import SPENT, march, span_of
 
 # Cells that cones cross one by one, before they widen.
 NEAR = 3.0
@@ -99,7 +100,7 @@ def trace_cones(hierarchy: Hierarchy, origins: np.ndarray, directions: np.ndarra
     first = march(hierarchy, origins, directions, normals, at)
     radiance, passed = first.radiance, first.passed
     start, direction = grid.cells_of(origins), np.asarray(directions, np.float64)
-    enter, leave = box_span(grid, start, direction)
+    enter, leave = span_of(hierarchy, start, direction)
     at, spread = np.maximum(enter, first.at), np.asarray(spread, np.float64)
     # What a wide cone reads of the outermost cells it reads in part when it has left them.
     leave += np.minimum(np.maximum(spread * leave, 1.0), clear * np.maximum(leave, 0.0) + 1.0)
@@ -112,6 +113,8 @@ def trace_cones(hierarchy: Hierarchy, origins: np.ndarray, directions: np.ndarra
         lod = np.minimum(np.minimum(lod, np.floor(np.log2(np.maximum(clear[rows] * position, 1.0)))), top)
         lod = np.where(sheet[rows] < 1, level[rows], lod)
         lod = level[rows] = _narrow(hierarchy, start[rows], direction[rows], position, step, lod)
+        if hierarchy.cascades:
+            lod = level[rows] = np.maximum(lod, coarsest_needed(hierarchy, start[rows] + direction[rows] * position[:, None]))
         advance = np.minimum(step * np.exp2(lod), leave[rows] - position)
         middle = position + 0.5 * advance
         met = _sample(hierarchy, start[rows] + direction[rows] * middle[:, None], direction[rows], lod)
@@ -157,7 +160,7 @@ def _narrow(hierarchy: Hierarchy, start, direction, at, step, lod) -> np.ndarray
         rows = np.flatnonzero(lod > index - 1) if level.wide.any() else np.zeros(0, int)
         if rows.size:
             middle = start[rows] + direction[rows] * (at[rows] + 0.5 * step * np.exp2(lod[rows]))[:, None]
-            low, _ = _low(level, middle / level.size)
+            low, _ = _low(level, middle / level.size - level.offset)
             lod[rows[level.wide[low @ np.array(level.strides)]]] = index - 1
     return lod
 
@@ -182,7 +185,8 @@ def _sample(hierarchy: Hierarchy, position, direction, lod) -> _Met:
         weight = np.where(lower == index, 1.0 - blend, np.where(lower == index - 1, blend, 0.0)).astype(np.float32)
         rows = np.flatnonzero(weight > 0)
         if rows.size:
-            _add(level, position[rows] / level.size, direction[rows], weight[rows] / np.float32(level.size), rows, met)
+            place = position[rows] / level.size - level.offset
+            _add(level, place, direction[rows], weight[rows] / np.float32(level.size), rows, met)
     return met
 
 

@@ -52,8 +52,8 @@ class Level:
     coarser levels whose surfaces are solid and lie in no plane: from afar these are parts of one surface as well, and ``depth``
     holds shares of crossings. Of the finest level's, ``plane`` (r, 5) float32 holds the unit normal, how far from the cell's centre
     along it the sheet lies, in cells, and how much of the plane in the cell it fills; or, where that is -1, where along x, y and z
-    lies all that blocks along it (Voxels.plates). ``wide`` (nz·ny·nx,) bool: where a sample
-    between a cell and the seven up from it would mix what walls keep apart (walls.py).
+    lies all that blocks along it (Voxels.plates). ``wide`` (nz·ny·nx,) bool: where a sample between a cell and the seven up from it
+    would mix what walls keep apart (walls.py). The level's corner lies at ``offset`` from the finest's, in its own cells.
     """
 
     size: int
@@ -66,6 +66,7 @@ class Level:
     adds: np.ndarray
     plane: np.ndarray | None
     wide: np.ndarray
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @property
     def strides(self) -> tuple[int, int, int]:
@@ -75,10 +76,17 @@ class Level:
 
 @dataclass(frozen=True, eq=False)
 class Hierarchy:
-    """``levels`` of ``grid``, finest first."""
+    """``levels`` of ``grid``, finest first. Where nested grids are its levels (cascades.py), ``cascades`` are those, and ``grid``
+    the first of them."""
 
     grid: VoxelGrid
     levels: tuple[Level, ...]
+    cascades: tuple[VoxelGrid, ...] = ()
+
+    @property
+    def outermost(self) -> VoxelGrid:
+        """The grid that all of it lies in."""
+        return self.cascades[-1] if self.cascades else self.grid
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,20 +104,21 @@ class _Cells:
     plates: np.ndarray | None = None
 
 
-def build_hierarchy(voxels: Voxels, radiance: np.ndarray, levels: int | None = None) -> Hierarchy:
-    """``levels`` (None: until a single cell is left) of ``voxels`` whose faces show ``radiance`` (m, 6, 3), premultiplied."""
+def build_hierarchy(voxels: Voxels, radiance: np.ndarray, levels: int | None = None, afar: bool = False) -> Hierarchy:
+    """``levels`` (None: until a single cell is left) of ``voxels`` whose faces show ``radiance`` (m, 6, 3), premultiplied.
+    ``afar``: those of ``voxels`` themselves are taken for parts of one surface as coarser ones are, too."""
     place = voxels.place
     area = voxels.area / voxels.grid.cell**2
     cells = _Cells(place, voxels.opacity, radiance, area, voxels.lie, voxels.solid, voxels.middle, voxels.plates)
     shape, size, made = voxels.grid.shape, 1, []
     while True:
-        made.append(_level(size, shape, cells, voxels.walls))
+        made.append(_level(size, shape, cells, voxels.walls, afar or size > 1))
         if len(made) == levels or max(shape) == 1:
             return Hierarchy(voxels.grid, tuple(made))
         cells, shape, size = _coarser(cells, shape), tuple(-(-count // 2) for count in shape), 2 * size
 
 
-def _level(size: int, shape, cells: _Cells, walls: Walls) -> Level:
+def _level(size: int, shape, cells: _Cells, walls: Walls, afar: bool) -> Level:
     place, opacity, count = cells.place, cells.opacity, len(cells.place) + 1
     padded = tuple(extent + 2 for extent in shape)
     row = np.zeros(int(np.prod(padded)), np.int32)
@@ -118,7 +127,7 @@ def _level(size: int, shape, cells: _Cells, walls: Walls) -> Level:
     met = np.maximum(opacity, np.finfo(np.float32).tiny)
     depth, glow = np.zeros((count, 3), np.float32), np.zeros((count, FACES, 3), np.float32)
     optical = np.minimum(-np.log(np.maximum(1.0 - opacity, np.exp(-OPAQUE))), OPAQUE)
-    adds = cells.solid & ~flat & (size > 1)
+    adds = cells.solid & ~flat & afar
     depth[1:] = np.where(flat[:, None], 0, np.where(adds[:, None], opacity, optical))
     glow[1:] = cells.radiance * np.repeat(depth[1:] / met, 2, axis=1)[:, :, None]
     sheet, shown = np.zeros((count, 3), np.float32), np.zeros((count, 2, 3), np.float32)
@@ -130,7 +139,7 @@ def _level(size: int, shape, cells: _Cells, walls: Walls) -> Level:
         faces = cells.radiance[np.arange(count - 1)[:, None], 2 * np.arange(3) + ends]
         shown[1:, side] = faces.sum(axis=1) / across
     plane = None
-    if size == 1:
+    if not afar:
         plane = np.zeros((count, 5), np.float32)
         offset = (normal * cells.middle).sum(axis=1)
         plane[1:, :3], plane[1:, 3] = normal, offset

@@ -6,6 +6,7 @@ of π·L. Along a direction radiance does not change: what is seen is the sum of
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -37,18 +38,38 @@ class March:
     at: np.ndarray
 
 
+def march_on(hierarchies: tuple[Hierarchy, ...], origins: np.ndarray, directions: np.ndarray, normals: np.ndarray | None = None,
+             first_hit: float | None = None) -> March:
+    """As ``march``, through the finest cells of one grid after the other that the rays come into, until they leave the last."""
+    found = march(hierarchies[0], origins, directions, normals, first_hit=first_hit)
+    radiance, passed, at = found.radiance, found.passed, found.at
+    for before, hierarchy in pairwise(hierarchies):
+        at = at * (before.grid.cell / hierarchy.grid.cell)
+        rows = np.flatnonzero(passed)
+        if not rows.size:
+            break
+        on = march(hierarchy, origins[rows], directions[rows], None if normals is None else normals[rows], first_hit=first_hit,
+                   begin=at[rows])
+        radiance[rows] += passed[rows, None] * on.radiance
+        passed[rows], at[rows] = passed[rows] * on.passed, on.at
+    return March(radiance, passed, at)
+
+
 def march(hierarchy: Hierarchy, origins: np.ndarray, directions: np.ndarray, normals: np.ndarray | None = None,
-          reach: np.ndarray | None = None, first_hit: float | None = None) -> March:
+          reach: np.ndarray | None = None, first_hit: float | None = None, begin: np.ndarray | None = None) -> March:
     """Follow rays from ``origins`` (n, 3) [m] along unit ``directions`` (n, 3) until they leave the grid, or until they come to an
     empty cell after ``reach`` (n,) cells.
 
     ``normals`` (n, 3) are those of the surfaces that they leave, which do not block them. ``first_hit``: a cell that takes more
     than this share of a ray ends it, and shows itself whole, as the lecture's does; None lets all cells count for what they cover.
+    What lies before ``begin`` (n,) cells is left out.
     """
     level, grid = hierarchy.levels[0], hierarchy.grid
     start, direction = grid.cells_of(origins), np.asarray(directions, np.float64)
     radiance, passed = np.zeros((len(start), 3), np.float32), np.ones(len(start), np.float32)
     enter, leave = box_span(grid, start, direction)
+    if begin is not None:
+        enter = np.maximum(enter, begin)
     reach, at = leave if reach is None else np.asarray(reach, np.float64), np.maximum(enter, 0.0)
     rows = np.flatnonzero(leave > enter)
     walk = _Walk(level, grid, start[rows], direction[rows], enter[rows], leave[rows], reach[rows],
@@ -83,6 +104,16 @@ def box_span(grid: VoxelGrid, start: np.ndarray, direction: np.ndarray) -> tuple
     low = np.where(still, np.where(within, -np.inf, np.inf), np.minimum(first, second))
     high = np.where(still, np.where(within, np.inf, -np.inf), np.maximum(first, second))
     return np.maximum(low.max(axis=1), 0.0), high.min(axis=1)
+
+
+def span_of(hierarchy: Hierarchy, start: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """As ``box_span``, of all that is in ``hierarchy``, in its finest cells."""
+    grid, outer = hierarchy.grid, hierarchy.outermost
+    if outer is grid:
+        return box_span(grid, start, direction)
+    scale = outer.cell / grid.cell
+    enter, leave = box_span(outer, outer.cells_of(grid.corner + start * grid.cell), direction)
+    return enter * scale, leave * scale
 
 
 class _Walk:

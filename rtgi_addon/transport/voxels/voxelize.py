@@ -102,8 +102,7 @@ def voxelize(geometry: Geometry, surfaces: Surfaces, grid: VoxelGrid, threads: i
     place of ``crossings``, for one axis after the other. Raises BakeError where there are none."""
     columns = (np.ascontiguousarray(geometry.triangles_world.T, np.float64) - np.reshape(grid.corner, (3, 1, 1))) / grid.cell
     low, high = (np.stack(edges) for edges in zip(*(extremes(axis) for axis in columns), strict=True))
-    size = np.reshape(grid.resolution, (3, 1))
-    met = geometry.visibility.diffuse[geometry.instance] & ((high >= -TIE) & (low <= size)).all(axis=0)
+    size, met = np.reshape(grid.resolution, (3, 1)), _met(geometry, grid, low, high)
     chosen = np.flatnonzero(met).astype(np.int32)
     if not chosen.size:
         raise BakeError(f"the voxel grid ({_box(grid)}) holds no geometry", "place the probe volumes where surfaces are")
@@ -129,6 +128,19 @@ def voxelize(geometry: Geometry, surfaces: Surfaces, grid: VoxelGrid, threads: i
     covered = np.maximum(sums[:, 1:2], np.finfo(np.float64).tiny)
     means = (sums[:, columns] / covered for columns in (slice(2, 5), slice(5, 8), slice(8, 14), slice(14, 17)))
     return Voxels(grid, cells, opacity, sums[:, 0], *means, sums[:, 17] == 0, plates, seen)
+
+
+def holds_geometry(geometry: Geometry, grid: VoxelGrid) -> bool:
+    """Whether the boxes of any triangles that diffuse rays meet reach into ``grid``."""
+    columns = (np.ascontiguousarray(geometry.triangles_world.T, np.float64) - np.reshape(grid.corner, (3, 1, 1))) / grid.cell
+    low, high = (np.stack(edges) for edges in zip(*(extremes(axis) for axis in columns), strict=True))
+    return bool(_met(geometry, grid, low, high).any())
+
+
+def _met(geometry: Geometry, grid: VoxelGrid, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Which (t,) bool of the triangles whose boxes reach from ``low`` to ``high`` (3, t) in cells are put into ``grid``."""
+    size = np.reshape(grid.resolution, (3, 1))
+    return geometry.visibility.diffuse[geometry.instance] & ((high >= -TIE) & (low <= size)).all(axis=0)
 
 
 def _areas(geometry: Geometry, cut, parts: list[Crossings], grid: VoxelGrid, lines: int) -> np.ndarray:

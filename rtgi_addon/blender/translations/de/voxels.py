@@ -32,6 +32,16 @@ VOXELS: dict[str, str] = {
     "bake it with a lower resolution": "mit einer kleineren Auflösung backen",
     "cones is {0}": "Kegel ist {0}",
     "give 6, or at least {0}": "6 angeben, oder mindestens {0}",
+    "gather is {0} and cascades is {1}": "Sammeln ist {0} und Kaskaden sind {1}",
+    "gather from receivers, or use one grid": "an den Empfängern sammeln oder ein einziges Gitter nehmen",
+    "cascades of {0} voxels leave nothing between their borders": "Kaskaden von {0} Voxeln lassen nichts zwischen ihren Rändern",
+    "raise resolution until there are {0} along each side, or set cascades to 1":
+        "die Auflösung erhöhen, bis es entlang jeder Seite {0} sind, oder Kaskaden auf 1 setzen",
+    "the cascades of the voxel grid lie about the scene's camera, and it has none":
+        "die Kaskaden des Voxelgitters liegen um die Kamera der Szene, und sie hat keine",
+    "add a camera, or set center to volumes": "eine Kamera hinzufügen oder die Mitte auf die Volumen setzen",
+    "{0} has voxels in {1} cascades, and bundles and exports hold one grid: their light goes along in probes alone":
+        "{0} hat Voxel in {1} Kaskaden, und Bündel und Exporte fassen ein Gitter: ihr Licht geht nur in Sonden mit",
     "putting the scene into voxels": "Szene in Voxel zerlegen",
     "lamps on voxels": "Lampen auf Voxeln",
     "light on voxels": "Licht auf Voxeln",
@@ -49,6 +59,11 @@ VOXEL_LABELS: dict[str, str] = {
         "Strahlen durch ein Gitter beleuchteter Voxel: was Voxel-Engines zeigen, hier langsamer als Strahlen zwischen Dreiecken",
     "Voxels along the longest side of the grid": "Voxel entlang der längsten Seite des Gitters",
     "Highest band of the exported probes": "Höchstes Band der exportierten Sonden",
+    "Grids about one place, each half as large as the one around it, in voxels half as large: finer there for as many voxels more":
+        "Gitter um eine Stelle, jedes halb so groß wie das um es herum, in halb so großen Voxeln: dort feiner, für so viele mehr",
+    "About": "Um",
+    "What cascades lie about: the middle of the probe volumes, or the scene's camera":
+        "Worum Kaskaden liegen: die Mitte der Sondenvolumen oder die Kamera der Szene",
     "Voxel Size": "Voxelgröße",
     "Side of a voxel; unset divides the longest side of the grid by the resolution":
         "Seite eines Voxels; ohne Angabe wird die längste Seite des Gitters durch die Auflösung geteilt",
