@@ -68,7 +68,7 @@ def check_folder_target(kind: Kind, out, *, inputs=()) -> Path:
 def ours(kind: Kind, path: Path, contents: bool = True) -> dict[str, str]:
     """What of the folder ``path`` is of a folder of ``kind`` (name → checksum), which must be all of it; ``contents`` also compares
     checksums. Raises BakeError for anything else that is there."""
-    return owned(path, kind.document, lambda: _document(kind, path)[0]["sha256"], kind.word, "written", contents)
+    return owned(path, kind.document, lambda: _document(kind, path)[0]["sha256"], kind.word, contents)
 
 
 def write_folder(kind: Kind, place: Workplace, document: dict, files: Mapping[str, Mapping[str, np.ndarray]]) -> Path:

@@ -126,7 +126,7 @@ def replaceable(path: Path, contents: bool = True) -> dict[str, str]:
 
     Raises BakeError for anything that is not of a bundle, that was changed since it was written, or that cannot be read.
     """
-    return owned(path, MANIFEST, lambda: _manifest_to_replace(path)["sha256"], "a bundle", "baked", contents)
+    return owned(path, MANIFEST, lambda: _manifest_to_replace(path)["sha256"], "a bundle", contents)
 
 
 def _manifest_to_replace(path: Path) -> dict:

@@ -9,12 +9,11 @@ from .inventory import BYSTANDERS, Stranger, first_stranger
 from .reading import sha256_of_file
 
 
-def owned(path: Path, document: str, listed: Callable[[], Mapping[str, str]], what: str, made: str,
-          contents: bool = True) -> dict[str, str]:
+def owned(path: Path, document: str, listed: Callable[[], Mapping[str, str]], what: str, contents: bool = True) -> dict[str, str]:
     """What of the folder ``path`` is ours (name → checksum): its ``document`` and the files that this names, which ``listed`` reads
     of it; all of the folder must be. Nothing of a folder that is not there. ``contents`` also compares checksums. ``what`` is what
-    people call such a folder, with its article, and it was ``made``. Raises BakeError for anything that is not of it, that was
-    changed since, or that cannot be read."""
+    people call such a folder, with its article. Raises BakeError for anything that is not of it, that was changed since it was
+    written, or that cannot be read."""
     try:
         if not path.is_dir():
             return {}
@@ -30,7 +29,7 @@ def owned(path: Path, document: str, listed: Callable[[], Mapping[str, str]], wh
     if stranger is None:
         return ours
     if stranger.changed:
-        raise BakeError(f"{path} holds {stranger.name}, which was changed since it was {made}",
+        raise BakeError(f"{path} holds {stranger.name}, which was changed since it was written",
                         "choose another --out, or move that folder away")
     raise BakeError(f"{path} holds {stranger.name}, which is not part of {what}",
                     "choose another --out, or move that away: the whole folder is replaced")

@@ -232,7 +232,7 @@ def test_a_bundle_that_was_changed_since_is_not_replaced(tmp_path):
     out = write(tmp_path / "out")
     (out / "Volume" / "sh0.exr").write_bytes(b"painted over")
     before = contents(tmp_path)
-    with pytest.raises(BakeError, match=r"holds Volume/sh0\.exr, which was changed since it was baked"):
+    with pytest.raises(BakeError, match=r"holds Volume/sh0\.exr, which was changed since it was written"):
         check_target(out)
     assert contents(tmp_path) == before
 

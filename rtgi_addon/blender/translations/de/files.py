@@ -5,7 +5,6 @@ FILES: dict[str, str] = {
     "create it first, or choose another --out": "ihn erst anlegen, oder einen anderen Ausgabeordner wählen",
     "{0} is a file": "{0} ist eine Datei",
     "choose a folder as --out": "einen Ordner für die Ausgabe wählen",
-    "{0} holds {1}, which is not part of a bundle": "{0} enthält {1}, das nicht zu Gebackenem gehört",
     "{0} holds {1}, which is not part of an export for {2}": "{0} enthält {1}, das nicht zu einem Export für {2} gehört",
     "choose another --out, or move that away: the whole folder is replaced":
         "einen anderen Ausgabeordner wählen oder das wegräumen: der ganze Ordner wird ersetzt",

@@ -50,7 +50,6 @@ STORAGE: dict[str, str] = {
     "{0} holds {1}, which rtgi did not write": "{0} enthält {1}, das rtgi nicht geschrieben hat",
     "{0} holds {1}, which was changed since it was written": "{0} enthält {1}, das geändert wurde, seit es geschrieben ist",
     "move that away: the folder goes when the work is done": "das wegräumen: der Ordner verschwindet, wenn die Arbeit getan ist",
-    "{0} holds {1}, which was changed since it was baked": "{0} enthält {1}, das seit dem Backen geändert wurde",
     "choose another --out, or move that folder away": "einen anderen Ausgabeordner wählen oder diesen wegräumen",
     "{0} was replaced while somebody put {1} there": "{0} wurde ersetzt, während jemand {1} dorthin legte",
     "the new bundle is whole; take what you need of {0}, and remove that":

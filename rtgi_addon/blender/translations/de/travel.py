@@ -1,8 +1,8 @@
 """Prepared bakes, their parts and clusters."""
 
 TRAVEL: dict[str, str] = {
-    "{0} holds {1}, which was changed since it was written": "{0} enthält {1}, das seit dem Schreiben geändert wurde",
     "{0} holds {1}, which is not part of {2}": "{0} enthält {1}, das nicht zu {2} gehört",
+    "a bundle": "Gebackenem",
     "a prepared bake": "einem vorbereiteten Backvorgang",
     "a part of a bake": "einem Teil eines Backvorgangs",
     "the new folder is whole; take what you need of {0}, and remove that":
