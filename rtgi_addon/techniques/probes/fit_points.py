@@ -30,7 +30,7 @@ SIGHT_RAYS = 64
 # under how many normals each point off a surface is read.
 SURFACE_POINTS, AIR_POINTS = 64, 64
 FEWEST_POINTS, MOST_POINTS = 2048, 1 << 15
-OFF_PART, NORMALS = 2, 2
+OFF_PART, NORMALS = 3, 3
 # Rays from each of those: their noise is averaged over many.
 AIR_RAYS = 64
 # What a point that is read costs in a whole fit, in rays, and where coefficients are fitted alone; and the share of its bake's work
