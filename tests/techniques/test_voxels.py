@@ -14,6 +14,7 @@ from rtgi_addon.evaluate.stability.parts import moved, rotation, turned, volume
 from rtgi_addon.numerics.sampling import fibonacci_sphere
 from rtgi_addon.progress import Progress
 from rtgi_addon.scene import World
+from rtgi_addon.techniques.voxels.lighting import VoxelLight
 
 NAMES = ("cone_tracing", "voxel_march")
 NORMALS = fibonacci_sphere(24).astype(np.float32)
@@ -57,6 +58,15 @@ def test_light_that_voxels_send_each_other_nears_all_light(name):
     assert part[1] == pytest.approx(0.75 * whole, rel=0.1) and part[2] == pytest.approx(whole, rel=0.1)
     # All others go on as one has begun.
     assert baked(name, scene, light="voxels").irradiance(POINTS, NORMALS).mean() == pytest.approx(whole, rel=0.07)
+
+
+def test_further_bounces_keep_no_more_than_surfaces_reflect():
+    field = baked("cone_tracing", build.closed_box(albedo=0.5), light="voxels", bounces=1)
+    lit = VoxelLight(field.context, field.voxels, field.settings, field.seed)
+    sent = np.ones((len(field.voxels.seen.weight), 3), np.float32)
+    # What a sweep spreads may seem more than what was sent; what escapes is known.
+    assert lit.still_to_come(sent, 1.2 * sent) == pytest.approx(np.ones(3), rel=1e-3)
+    assert lit.still_to_come(sent, 0.2 * sent) == pytest.approx(np.full(3, 0.25), rel=1e-3)
 
 
 def test_voxels_reflect_the_sky_as_they_do_lamps():
