@@ -41,6 +41,7 @@ def note_unresolved(scene, view_layer, omissions: Omissions) -> None:
     if len(bpy.data.libraries):
         _note_missing_data(usage, omissions)
     _note_missing_files(usage, omissions)
+    _note_texture_limit(scene, usage, omissions)
     if bpy.app.autoexec_fail:
         _note_scripts(usage, omissions)
 
@@ -70,6 +71,19 @@ def _note_missing_files(usage, omissions) -> None:
         if concerned:
             omissions.add(f"file {block.filepath} is missing, and with it {_named(block, concerned)}", objects=sorted(concerned),
                           remedy=_FIND)
+
+
+def _note_texture_limit(scene, usage, omissions) -> None:
+    """Of images that Cycles makes smaller before it renders: *Simplify > Texture Limit*. Here they are whole."""
+    limit = getattr(getattr(scene, "cycles", None), "texture_limit_render", "OFF")
+    if not scene.render.use_simplify or limit == "OFF":
+        return
+    for image in bpy.data.images:
+        # Asked for its size an image is read: only one that somebody uses.
+        concerned = usage.of(image) if image.users else ()
+        if concerned and max(image.size) > int(limit):
+            omissions.add(f"image {image.name} is read whole, and Cycles makes it no larger than {limit} pixels "
+                          f"(Simplify > Texture Limit)", objects=sorted(concerned))
 
 
 def _note_scripts(usage, omissions) -> None:

@@ -182,3 +182,25 @@ def test_a_pipe_or_a_device_in_the_place_of_an_image_is_not_waited_for(empty_ble
     link("box", cube_mesh()).data.materials.append(paint)
     with pytest.raises(BakeError, match=r"image 'wood\.png' is read from .*wood\.png, a pipe, a device or a socket"):
         extract_scene()
+
+
+def test_images_that_cycles_would_make_smaller_are_named(empty_blend):
+    scene = bpy.context.scene
+    paint = material("paint", (0.5, 0.5, 0.5))
+    node = paint.node_tree.nodes.new("ShaderNodeTexImage")
+    node.image = bpy.data.images.new("large", 256, 64)
+    surface = next(other for other in paint.node_tree.nodes if other.type.startswith("BSDF"))
+    paint.node_tree.links.new(node.outputs["Color"], surface.inputs[0])
+    link("box", cube_mesh()).data.materials.append(paint)
+    bpy.data.images.new("of nobody", 512, 512)
+
+    def named():
+        return [(omission.text, omission.objects) for omission in extract_scene().omissions if "Texture Limit" in omission.text]
+
+    scene.cycles.texture_limit_render = "128"
+    assert not named()
+    scene.render.use_simplify = True
+    (text, objects), = named()
+    assert text.startswith("image large is read whole") and "than 128 pixels" in text and objects == ("box",)
+    scene.cycles.texture_limit_render = "256"
+    assert not named()

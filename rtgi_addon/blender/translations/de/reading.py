@@ -98,6 +98,8 @@ READING: dict[str, str] = {
     "restore it, or choose File > External Data > Find Missing Files; or remove what needs it":
         "wiederherstellen, oder Datei > Externe Daten > Fehlende Dateien suchen; oder entfernen, was es braucht",
     "file {0} is missing, and with it {1}": "die Datei {0} fehlt, und mit ihr {1}",
+    "image {0} is read whole, and Cycles makes it no larger than {1} pixels (Simplify > Texture Limit)":
+        "Bild {0} wird ganz gelesen, und Cycles macht es nicht größer als {1} Pixel (Vereinfachen > Texturgrenze)",
     "{0} is driven by Python that was not run: {1}": "{0} hängt von Python ab, das nicht ausgeführt wurde: {1}",
     "allow the file's scripts if you trust it (--enable-scripts, or Allow Execution), or delete the driver":
         "die Skripte der Datei erlauben, wenn man ihr traut (--enable-scripts, oder Ausführung erlauben), oder den Treiber löschen",
