@@ -5,8 +5,8 @@
 Made for two idle cores, where it takes some 27 minutes: it stops beginning new tables when --minutes are over, says which are
 missing, and goes on with those the next time unless --again is given or the commit has changed. Tables of hours (`make charts`), of
 files that are not in this repository (real_scenes.py) and of a window or GPU (preview.py, preview_vs_cycles.py, rsm_capture.py,
-gpu_kernels.py) are not among them. Results lie in benchmarks/results/tables, one file a table with the load of the machine before
-and after it, and together in all.txt, ready to be pasted. With --tiny the same scripts measure as little as they can, in a few
+gpu_kernels.py) are not among them. Results lie in benchmarks/results/tables, one file a table that says how busy the machine was
+before it, and together in all.txt, ready to be pasted. With --tiny the same scripts measure as little as they can, in a few
 minutes: whether every table comes to its end is then known before the long run. Those results lie in the folder tiny there.
 """
 
@@ -23,8 +23,8 @@ ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "benchmarks/results/tables"
 # What Blender's module says of files, and numpy of forks, between a script's own lines.
 _NOISE = re.compile(r"^\d\d:\d\d\.\d+ |^Error: Not freed|DeprecationWarning|^  child = ")
-# Above so much load before it begins, a table says that its machine was busy.
-_IDLE = 0.7
+# Above so many busy cores before it begins, a table says so. The load will not do: it still counts the table before.
+_IDLE = 0.3
 
 
 class Table(NamedTuple):
@@ -70,14 +70,25 @@ def commit() -> str:
     return (git("rev-parse", "--short=12", "HEAD") or "unknown") + (" and changes" if git("status", "--porcelain", "-uno") else "")
 
 
-def load() -> float:
-    """The load of the last minute; 0 where the system does not tell."""
-    return os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
+def busy_cores(seconds: float = 1.0) -> float:
+    """How many cores are at work now, by what Linux counts within ``seconds``; 0 where the system does not tell."""
+    counts = Path("/proc/stat")
+    if not counts.exists():
+        return 0.0
+
+    def spent() -> tuple[int, int]:
+        ticks = [int(word) for word in counts.read_text().split("\n", 1)[0].split()[1:9]]
+        return sum(ticks) - ticks[3] - ticks[4], sum(ticks)
+
+    before = spent()
+    time.sleep(seconds)
+    busy, whole = (after - earlier for after, earlier in zip(spent(), before, strict=True))
+    return busy / max(whole, 1) * (os.cpu_count() or 1)
 
 
 def measure(name: str, table: Table, head: str, results: Path) -> bool:
     """Run one script, show what it prints and keep it among the ``results``. Whether it came to its end."""
-    before, started = load(), time.perf_counter()
+    before, started = busy_cores(), time.perf_counter()
     print(f"\n## {table.section} ({name})\n\n`python benchmarks/{table.command}`\n", flush=True)
     words = [sys.executable, str(ROOT / "benchmarks" / table.command.split()[0]), *table.command.split()[1:]]
     lines = []
@@ -88,7 +99,7 @@ def measure(name: str, table: Table, head: str, results: Path) -> bool:
                 print(lines[-1], flush=True)
     minutes = (time.perf_counter() - started) / 60
     busy = "" if before <= _IDLE else ", **others were at work**"
-    note = f"{minutes:.1f} min, load {before:.1f} before and {load():.1f} after{busy}"
+    note = f"{minutes:.1f} min, {before:.1f} cores at work before it{busy}"
     print(f"\n({note})", flush=True)
     done = running.returncode == 0
     if done:
@@ -123,7 +134,7 @@ def main() -> int:
         tables = {name: table._replace(command=f"{table.command.split()[0]} {table.tiny}") for name, table in TABLES.items()}
     results.mkdir(parents=True, exist_ok=True)
     head, started, failed, left = commit(), time.perf_counter(), [], []
-    print(f"commit {head}, {os.cpu_count()} cores, load {load():.1f}", flush=True)
+    print(f"commit {head}, {os.cpu_count()} cores, {busy_cores():.1f} at work", flush=True)
     wanted = [name for name in arguments.only if name not in arguments.skip]
     for name in wanted:
         if not arguments.again and known(name, head, results):
