@@ -2,7 +2,8 @@
 
 A probe in the very plane of a wall sees that wall in every direction and nothing else, and one a hair behind it is dark: lattices
 drawn to fit a room have whole layers of them. Like RTXGI-DDGI's relocation this keeps probes a clearance away from surfaces; they
-go to the side that the nearest one faces.
+go to the side that the nearest one faces. One that is clear of a surface, but behind it, is sent through it only where far less is
+seen from behind there: beside a box of which some faces are turned it would end in the box.
 """
 
 from dataclasses import dataclass
@@ -30,6 +31,8 @@ CLEARANCE = 0.05
 MOST_WALLS = 3
 # Surfaces count as near up to this many clearances along a ray: from just outside a corner no ray meets its walls sooner.
 NEAR_ALONG_RAY = 4.0
+# A probe that is clear of what it is behind goes through that where its rays meet less than this share of the backs from there.
+_LESS_BEHIND = 0.5
 # A probe nearer than this share of the clearance is moved: rounding must not leave one that was moved already a hair short of it.
 _WITHIN = 0.99
 # Distances that probes keep are clamped to this many diagonals of a cell.
@@ -127,13 +130,35 @@ def _leave_solids(context, lattice, step, pilot, offset, measured, progress) -> 
 
 
 def _leave_surfaces(context, lattice, step, offset, measured, progress) -> None:
-    """Move measured probes nearer than CLEARANCE to a surface away from it, to the side that it faces; changes their ``offset``."""
-    rows = np.flatnonzero(measured)
+    """Move measured probes nearer than CLEARANCE to a surface, or a little behind it, to the side that it faces; changes their
+    ``offset``."""
+    rows, before, through = np.flatnonzero(measured), offset.copy(), np.zeros(len(offset), bool)
     for _ in range(MOST_WALLS):
         normal, height = _nearest_surface(context, lattice[rows] + offset[rows], CLEARANCE * step[rows], progress)
         near = np.flatnonzero(height < _WITHIN * CLEARANCE * step[rows])
         rows, normal, height = rows[near], normal[near], height[near]
+        through[rows] |= height < -CLEARANCE * step[rows]
         offset[rows] += normal * (CLEARANCE * step[rows] - height)[:, None]
+    through = np.flatnonzero(through)
+    here, there = (_back_share(context, lattice[through] + moved[through], progress) for moved in (before, offset))
+    back = through[there >= _LESS_BEHIND * here]
+    offset[back] = before[back]
+
+
+def _back_share(context, points, progress) -> np.ndarray:
+    """(n,) share of rays from ``points`` (n, 3) that meet the back of a surface, solid or not."""
+    directions = fibonacci_sphere(PILOT_RAYS)
+    spans = chunks(len(points), CHUNK // PILOT_RAYS)
+
+    def trace(i):
+        count = len(points[spans[i]])
+        rays = np.repeat(directions, count, axis=0)
+        hits = context.tracer.intersect(np.tile(points[spans[i]], (PILOT_RAYS, 1)), rays)
+        rows = np.flatnonzero(hits.primitive >= 0)
+        rows = rows[dot(context.geometry.normals_world[hits.primitive[rows]], rays[rows]) > 0]
+        return np.bincount(rows % count, minlength=count) / PILOT_RAYS
+
+    return np.concatenate([np.zeros(0), *parallel_for(trace, len(spans), context.threads, progress, "placing probes")])
 
 
 def _nearest_surface(context, points, clearance, progress):

@@ -44,6 +44,23 @@ def test_a_sheet_sends_probes_to_the_side_it_faces():
     assert np.allclose(placed(below).positions[4:8, 2], -CLEARANCE, atol=1e-6)
 
 
+def test_a_probe_beside_a_box_with_a_turned_face_does_not_end_in_the_box():
+    """It is clear of that face; one a little behind a room's wall, which shows it no back from within, still goes in."""
+    box = build.cube(half_size=0.5)
+    half_turned = box.triangles.copy()
+    half_turned[[0, 1, 4, 5, 8, 9]] = half_turned[[0, 1, 4, 5, 8, 9], ::-1]
+    beside = build.volume(resolution=(2, 1, 1), half_size=1.2, center=(-1.2, 0.0, 0.0))
+    scene = build.scene([build.mesh("half turned", box.vertices_local, half_turned)], volumes=[beside])
+    points = lattice_points(beside.world_from_local, (2, 1, 1)).reshape(-1, 3)
+    distance = -0.5 - points[:, 0].max()
+    assert CLEARANCE * 1.2 < distance < 0.2 * 1.2
+    assert not placed(scene).offset.any()
+    outside = room_with_lattice(1.25 * 1.05)
+    points = lattice_points(outside.volumes[0].world_from_local, (5, 5, 5)).reshape(-1, 3)
+    behind_one = np.count_nonzero(np.abs(points) > 1.0, axis=1) == 1
+    assert behind_one.sum() == 54 and np.abs(placed(outside).positions[behind_one]).max() < 1.0
+
+
 def test_a_turned_lattice_keeps_probes_as_far_off_as_its_shortest_side_says():
     cosine = np.sqrt(0.5)
     turn = np.array([[cosine, -cosine, 0, 0], [cosine, cosine, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
