@@ -74,7 +74,7 @@ def address_bytes_left() -> int | None:
 def threads_that_fit(wanted: int) -> int:
     """``wanted`` threads, or as many as there is address space for; at least one, which is this one. Python waits for ever for a
     thread that had no room to begin."""
-    left = address_bytes_left()
+    left = address_bytes_left() if wanted > 1 else None
     return wanted if left is None else max(1, min(wanted, left // (4 * _stack())))
 
 

@@ -51,10 +51,15 @@ def begin_bake(scene: Scene, settings, rng: np.random.Generator, progress: Progr
     validate_settings(settings)
     if not scene.volumes:
         raise BakeError("the scene has no probe volume", "add a Light Probe Volume")
-    seed = int(rng.integers(1 << 32))
+    seed = seed_of(rng)
     progress.stage("ray tracer")
     progress.step(0.0, "building the ray tracer")
     return context or LightContext(scene, threads), seed
+
+
+def seed_of(rng: np.random.Generator) -> int:
+    """The seed of a bake that is given ``rng``."""
+    return int(rng.integers(1 << 32))
 
 
 def volumes_by_settings(volumes: tuple[ProbeVolume, ...], settings) -> list[tuple[object, tuple[ProbeVolume, ...]]]:

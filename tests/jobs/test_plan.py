@@ -60,18 +60,18 @@ def test_a_planned_bake_ships_what_was_planned_and_is_checked(tmp_path, monkeypa
 
 def test_a_planned_bake_that_was_interrupted_is_planned_again_in_the_same_way(tmp_path, monkeypatch):
     def bake(out, **options):
-        return bake_planned(room(resolution=(3, 3, 3)), Target(0.2), tmp_path / out, check=False, checkpoint_seconds=0.0, **options)
+        return bake_planned(room(resolution=(3, 3, 3)), Target(0.1), tmp_path / out, check=False, checkpoint_seconds=0.0, **options)
 
     save, saved = Parts.save, []
 
-    def until_the_second(self, *part):
+    def until_the_first(self, *part):
         save(self, *part)
         saved.append(part)
-        if len(saved) == 2:
+        if len(saved) == 1:
             raise Cancelled("enough")
 
     with monkeypatch.context() as patch:
-        patch.setattr(Parts, "save", until_the_second)
+        patch.setattr(Parts, "save", until_the_first)
         with pytest.raises(Cancelled, match="enough"):
             bake("out", threads=1)
     resumed, whole = bake("out", threads=2, resume=True), bake("whole", threads=1)

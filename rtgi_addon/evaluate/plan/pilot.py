@@ -13,14 +13,16 @@ import numpy as np
 
 from ...progress import Progress
 from ...scene import ProbeVolume
+from ...techniques.base import seed_of
 from ...techniques.lamp_light import LampLight
 from ...techniques.lattice.placement import PILOT_RAYS, place_points
 from ...techniques.probes import LAMP_SAMPLES
 from ...techniques.probes.adaptive import FIRST_ROUND, SAMPLING_SHARE, SLOPE, ErrorModel
-from ...techniques.probes.bake import Begun, surface_cache
+from ...techniques.probes.bake import Begun, mean_distances, surface_cache
 from ...techniques.probes.gather import GROUP
-from ...techniques.probes.gathering import HALVES, PROBE_RAYS, ProbeLight, light_at_probes, light_at_receivers
+from ...techniques.probes.gathering import HALVES, light_at_receivers
 from ...techniques.probes.settings import ProbeSettings
+from ...techniques.probes.started import HALF_RAYS, PROBE_RAYS, StartedProbes, lattice_key, rounded_out, start_probes
 from ...transport.context import LightContext
 from ...transport.rays.ray_counter import count_rays
 from ..metrics import Figure
@@ -92,10 +94,12 @@ class Reading:
         return self._known[error]
 
     def _rays(self, error: float) -> np.ndarray:
-        probes = np.flatnonzero(self.model.rays > 0)
-        groups = np.unique(probes // GROUP, return_inverse=True)[1].reshape(-1)
-        needed = self.model.rays_needed(probes, groups, error * SAMPLING_SHARE, ProbeSettings().max_rays)
-        return np.maximum(needed, FIRST_ROUND)
+        if "forecast" not in self._known:
+            probes = np.flatnonzero(self.model.rays > 0)
+            # Neighbours, if not those that share directions.
+            groups = np.unique(probes // GROUP, return_inverse=True)[1].reshape(-1)
+            self._known["forecast"] = self.model.forecast(probes, groups)
+        return np.maximum(self._known["forecast"].rays_needed(error * SAMPLING_SHARE, ProbeSettings().max_rays), FIRST_ROUND)
 
     def error(self, order: int, error: float | None = None) -> Figure:
         """Relative RMSE at the receivers, and its standard error over surface points, of a bake with SH of ``order`` and the target
@@ -149,7 +153,8 @@ class Pilot:
         self.cache = surface_cache(context, volumes, self.settings, seed)
         self.receiver_rays = int(np.clip(RECEIVER_RAYS * 2.0 ** round(2.0 * np.log2(USUAL_TARGET / target)), *RECEIVER_RANGE))
         self._known: dict[tuple, Reading] = {}
-        self._baked: dict[tuple, _Baked] = {}  # by lattice, each as if of one volume
+        self._started: dict[tuple, StartedProbes] = {}  # by lattice
+        self._bake_seed = seed_of(np.random.default_rng(seed))
         self._probes = 0
         self.truth, self.truth_effort = Truth(*np.zeros((2, 0, 3))), Effort(0, 0.0)
         self._trace_truth(self.points(0), progress)
@@ -161,12 +166,12 @@ class Pilot:
 
     @property
     def begun(self) -> Begun:
-        """What a bake of the same scene need not do again."""
-        return Begun(self.context, self.cache, self.settings.target)
+        """What a bake of the same scene with the same seed need not do again."""
+        return Begun(self.context, self.cache, self.settings.target, tuple(self._started.values()))
 
     @property
     def spent(self) -> int:
-        """Rays that went into what a bake has no use for: all but those of the cache."""
+        """Rays that went into what most of a bake has no use for: all but those of the cache."""
         return len(self.truth.mean) * self.receiver_rays + self._probes * RAYS_A_PROBE
 
     def points(self, level: int) -> int:
@@ -184,7 +189,7 @@ class Pilot:
         """The same of any ``volumes``, of other boxes than the pilot's as well. Raises Cancelled."""
         points = self.points(level)
         self._trace_truth(points, progress.span(0.0, _PLACED))
-        key = tuple(map(_lattice, volumes)), points
+        key = tuple(map(lattice_key, volumes)), points
         if key not in self._known:
             self._known[key] = self._measured(volumes, self.sample.receivers.take(slice(0, points * NORMALS_PER_POINT)), progress)
         return self._known[key]
@@ -210,94 +215,64 @@ class Pilot:
             started = perf_counter()
             baked = self._completed(volumes, read, progress)
             effort = Effort(counter.rays, perf_counter() - started)
-        sparse = SparseField([SparseLookup(volume, *baked.of_volume(number)) for number, volume in enumerate(volumes)])
-        return self._reading(volumes, receivers, sparse, baked, effort)
+        return self._reading(volumes, receivers, baked, effort)
 
-    def _completed(self, volumes, read: list[np.ndarray], progress: Progress) -> "_Baked":
-        """Light of the probes that are ``read`` (rows by volume) and of those that are known, which are not traced again."""
-        known = [self._baked.get(_lattice(volume)) for volume in volumes]
-        rows = [probes if old is None else np.setdiff1d(probes, old.rows) for probes, old in zip(read, known, strict=True)]
+    def _completed(self, volumes, read: list[np.ndarray], progress: Progress) -> list[StartedProbes]:
+        """The probes that are ``read`` (rows by volume) and those that are known, which are not traced again, by volume."""
+        starts, known, rows = np.cumsum([0, *(int(np.prod(volume.resolution)) for volume in volumes)]), [], []
+        for volume, first, probes in zip(volumes, starts, read, strict=False):
+            old = self._started.get(lattice_key(volume))
+            known.append(old)
+            wanted = rounded_out(volume, int(first) if old is None else old.start, probes)
+            rows.append(wanted if old is None else np.setdiff1d(wanted, old.rows))
         owner = np.repeat(np.arange(len(volumes)), [len(own) for own in rows])
-        if len(owner):
-            self._probes += len(owner)
-            lattice = np.concatenate([positions_of(volume, own) for volume, own in zip(volumes, rows, strict=True)])
-            placement = place_points(self.context, volumes, lattice, owner, self.settings.virtual_offset,
-                                     progress.span(0.0, _PLACED))
-            # Groups of probes share directions: those of a later call are others.
-            seed = self._seed + sum(len(old.rows) for old in known if old is not None)
-            light = light_at_probes(self.context, self.cache, self.settings, placement, seed, progress.span(_PLACED, _GATHERED))
-            new = _Baked(owner, np.concatenate(rows), lattice + placement.offset, placement.measured, light)
-            for number, (volume, old) in enumerate(zip(volumes, known, strict=True)):
-                own = new.take(np.flatnonzero(owner == number), 0)
-                known[number] = self._baked[_lattice(volume)] = own if old is None else old.joined(own)
-        return _Baked.stacked([own.take(np.arange(len(own.rows)), number) for number, own in enumerate(known) if own is not None])
+        if not len(owner):
+            return [old for old in known if old is not None]
+        self._probes += len(owner)
+        lattice = np.concatenate([positions_of(volume, own) for volume, own in zip(volumes, rows, strict=True)])
+        placed = place_points(self.context, volumes, lattice, owner, self.settings.virtual_offset, progress.span(0.0, _PLACED))
+        for number, (volume, old) in enumerate(zip(volumes, known, strict=True)):
+            own = owner == number
+            if not own.any():
+                continue
+            done = _PLACED + (_GATHERED - _PLACED) * np.searchsorted(owner, [number, number + 1]) / len(owner)
+            start = int(starts[number]) if old is None else old.start
+            new = start_probes(self.context, self.cache, self.settings, volume, start, self._bake_seed, rows[number],
+                               placed.take(own), progress.span(*done))
+            known[number] = self._started[lattice_key(volume)] = new if old is None else old.joined(new)
+        return known
 
-    def _reading(self, volumes, receivers, field, baked: "_Baked", effort) -> Reading:
-        light, owner = baked.light, baked.owner
-        shares = _Shares(volumes, receivers, field, owner)
+    def _reading(self, volumes, receivers, baked: list[StartedProbes], effort) -> Reading:
+        side = self.settings.visibility_resolution
+        field = SparseField([SparseLookup(volume, own.rows, own.placement.positions, own.placement.measured,
+                                          mean_distances(own.distance, own.weight, side), own.sh)
+                             for volume, own in zip(volumes, baked, strict=True)])
+        shares = _Shares(volumes, receivers, field, np.cumsum([0, *(len(own.rows) for own in baked)]))
+        first, second, sh, measured = (np.concatenate(parts) for parts in (
+            [own.first for own in baked], [own.second for own in baked], [own.sh for own in baked],
+            [own.placement.measured for own in baked]))
 
         # Neither is deringed: that would be the noise of few rays, which a bake does not have.
         @cache
         def estimate(order):
-            return shares.irradiance(light.sh[:, :(order + 1) ** 2])
+            return shares.irradiance(sh[:, :(order + 1) ** 2])
 
-        halves = [shares.irradiance((sums / light.rays).astype(np.float32)) for sums in (light.first, light.second)]
-        model = ErrorModel(len(owner), light.first.shape[1])
-        probes = np.flatnonzero(baked.measured)
-        for sums in (light.first, light.second):
-            model.add(probes, sums[probes], np.full(len(probes), light.rays))
+        halves = [shares.irradiance((sums / HALF_RAYS).astype(np.float32)) for sums in (first, second)]
+        model = ErrorModel(len(measured), first.shape[1])
+        probes = np.flatnonzero(measured)
+        for sums in (first, second):
+            model.add(probes, sums[probes], np.full(len(probes), HALF_RAYS))
         return Reading(volumes, len(probes), estimate, HALVES * (halves[0] - halves[1]) ** 2, self, model,
                        shares.mixed, effort)
 
 
-def _lattice(volume: ProbeVolume) -> tuple:
-    """What makes the lattice of ``volume``: its box and its resolution."""
-    return tuple(volume.resolution), np.asarray(volume.world_from_local, np.float64).tobytes()
-
-
-@dataclass(frozen=True, eq=False)
-class _Baked:
-    """Some probes of lattices, sorted by the volume ``owner`` (m,) and the flat index ``rows`` (m,) in it: ``positions`` (m, 3),
-    which of them were ``measured`` (m,), and their ``light``."""
-
-    owner: np.ndarray
-    rows: np.ndarray
-    positions: np.ndarray
-    measured: np.ndarray
-    light: ProbeLight
-
-    def take(self, chosen: np.ndarray, owner: int) -> "_Baked":
-        """Those of the rows ``chosen`` (indices), as probes of the volume ``owner``."""
-        light = ProbeLight(self.light.first[chosen], self.light.second[chosen], self.light.rays, self.light.visibility[chosen])
-        return _Baked(np.full(len(chosen), owner), self.rows[chosen], self.positions[chosen], self.measured[chosen], light)
-
-    def joined(self, other: "_Baked") -> "_Baked":
-        """These and ``other`` probes of the same lattice."""
-        return _Baked.stacked([self, other]).take(np.argsort(np.append(self.rows, other.rows)), 0)
-
-    @staticmethod
-    def stacked(parts: list["_Baked"]) -> "_Baked":
-        """The probes of several, one after another, of whatever volumes they are."""
-        def all_of(name: str, of=lambda part: part) -> np.ndarray:
-            return np.concatenate([getattr(of(part), name) for part in parts])
-
-        light = [all_of(name, lambda part: part.light) for name in ("first", "second", "visibility")]
-        return _Baked(*map(all_of, ("owner", "rows", "positions", "measured")),
-                      ProbeLight(light[0], light[1], parts[0].light.rays, light[2]))
-
-    def of_volume(self, number: int) -> tuple[np.ndarray, ...]:
-        """Rows, positions, liveness, distances and coefficients of the probes of a volume, as SparseLookup takes them."""
-        own = self.owner == number
-        return self.rows[own], self.positions[own], self.measured[own], self.light.visibility[own], self.light.sh[own]
-
-
 class _Shares:
     """Which probes each of ``receivers`` reads in ``field``, and in what shares: once, for all that is asked of the same lattices.
-    The m probes stand one volume after another, ``owner`` (m,)."""
+    The probes stand one volume after another, each volume's from its one of ``starts`` on."""
 
-    def __init__(self, volumes, receivers: Receivers, field: SparseField, owner: np.ndarray):
+    def __init__(self, volumes, receivers: Receivers, field: SparseField, starts: np.ndarray):
         share = field.shares(receivers.points)
-        starts = {id(volume): np.searchsorted(owner, number) for number, volume in enumerate(volumes)}
+        starts = {id(volume): start for volume, start in zip(volumes, starts[:-1], strict=True)}
         self._normals, self._parts = receivers.normals, []
         for column, lookup in enumerate(field.lookups):
             rows = np.flatnonzero(share[:, column])

@@ -148,6 +148,10 @@ class Search:
                 return climb
             wanted = self._stride(climb, order)
             if self._tries.probes(factor * wanted) > self._tries.cap:
+                if any(other.bulk(order, self._climbed) <= self._target for _, other in climb):
+                    # What is left lies on the worst points, which finer lattices do little about, and is not worth those.
+                    self._limited = "effort"
+                    return climb
                 # One lattice so fine is worth a try, after one of as many probes as that, and where it should do.
                 last = (self._tries.cap / self._tries.probes(factor)) ** (1.0 / 3.0)
                 if last < 1.0 or (last < LEAST_STRIDE and wanted > MOST_STRIDE):

@@ -6,6 +6,7 @@ go to the side that the nearest one faces. One that is clear of a surface, but b
 seen from behind there: beside a box of which some faces are turned it would end in the box.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -54,20 +55,34 @@ class Placement:
     measured: np.ndarray
     reach: np.ndarray
 
+    def take(self, rows: np.ndarray) -> "Placement":
+        """Those of ``rows`` alone."""
+        return Placement(self.positions[rows], self.offset[rows], self.validity[rows], self.measured[rows], self.reach[rows])
 
-def place(context: LightContext, volumes: tuple[ProbeVolume, ...], virtual_offset: bool, progress: Progress) -> Placement:
+
+def place(context: LightContext, volumes: tuple[ProbeVolume, ...], virtual_offset: bool, progress: Progress,
+          known: Sequence[tuple[np.ndarray, Placement]] = ()) -> Placement:
     """Find out which probes are inside solids, and move those that can be moved. Probes that nobody wants count as inside, and
-    those of scattered volumes stand where they should."""
+    those of scattered volumes stand where they should. How some stand may be ``known``: the probes (m,), by their numbers, and
+    their Placement (m)."""
     points = [lattice_points(volume.world_from_local, volume.resolution).reshape(-1, 3) for volume in volumes]
     wanted = [np.zeros(len(lattice), bool) if volume.scattered is not None else
               np.ones(len(lattice), bool) if mask is None else np.asarray(mask, bool).reshape(-1)
               for volume, mask, lattice in zip(volumes, worth_rays(context.geometry, volumes), points, strict=True)]
     owner = np.repeat(np.arange(len(volumes)), [len(lattice) for lattice in points])
-    lattice, rows = np.concatenate(points), np.flatnonzero(np.concatenate(wanted))
+    lattice, left = np.concatenate(points), np.concatenate(wanted)
+    known = [(probes, placed, left[probes]) for probes, placed in known]
+    for probes, _, _ in known:
+        left[probes] = False
+    rows = np.flatnonzero(left)
     placed = place_points(context, volumes, lattice[rows], owner[rows], virtual_offset, progress)
     if len(rows) == len(lattice):
         return placed
-    return _with_scattered(volumes, _whole(placed, lattice, rows))
+    whole = _whole(placed, lattice, rows)
+    for probes, placed, own in known:
+        for name in ("positions", "offset", "validity", "measured", "reach"):
+            getattr(whole, name)[probes[own]] = getattr(placed, name)[own]
+    return _with_scattered(volumes, whole)
 
 
 def _whole(placed: Placement, lattice: np.ndarray, rows: np.ndarray) -> Placement:

@@ -14,6 +14,8 @@ rooms; sharp patches of light have 0.65. Between powers of two a sequence errs h
 it are those of a smaller net.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 # Rays of every probe before its error is first asked for: the last of the rounds that all have.
@@ -84,32 +86,17 @@ class ErrorModel:
         return np.sqrt(variance * self.rays[probes] ** (-2.0 * slope[groups])) * scale
 
     def rays_needed(self, probes: np.ndarray, groups: np.ndarray, target: float, highest: int) -> np.ndarray:
-        """Number of rays (m,), at least those that they have and at most ``highest``, at which the mean square over lit ``probes``
-        of their errors, each relative to its scale, is expected to fall to that of ``target``; one for all of a group, doubled as
-        often as it takes, the worst first. Groups are runs of ``probes`` that have had the same rays, counted from 0."""
-        if not len(probes):
-            return np.zeros(0, np.int64)
+        """See Forecast.rays_needed: of ``probes`` (m,) in ``groups`` (m,)."""
+        return self.forecast(probes, groups).rays_needed(target, highest)
+
+    def forecast(self, probes: np.ndarray, groups: np.ndarray) -> "Forecast":
+        """How the errors of ``probes`` (m,) go on. Groups are runs of them that have had the same rays, counted from 0."""
         scale = self.scale(probes)
         variance, slope = self._at_one(probes, groups, scale)
         first = np.flatnonzero(np.diff(groups, prepend=-1))
         rays, size = self.rays[probes[first]], np.bincount(groups)
-        now = np.bincount(groups, variance) * rays ** (-2.0 * slope) / size
-        # A mean over few groups may be small by luck: it is taken for as much more as one standard error of it.
-        falls, allowed = 2.0 ** (-2.0 * slope), target**2 / (1.0 + np.sqrt(2.0 / (FREEDOM * len(size))))
-        # Probes in the dark, which have no error, do not make room for that of others.
-        sum_allowed = allowed * np.count_nonzero(scale)
-        steps = np.arange(max(1, int(np.ceil(np.log2(max(highest, 1) / max(rays.min(), 1)))) + 1))
-        values = now[:, None] * falls[:, None] ** steps
-        open_steps = rays[:, None] * 2.0**steps < highest
-        saved = np.where(open_steps, values * (1.0 - falls[:, None]) * size[:, None], 0.0).reshape(-1)
-        order = np.argsort(-np.where(open_steps, values, -1.0).reshape(-1), kind="stable")
-        left = float((now * size).sum()) - np.cumsum(np.append(0.0, saved[order]))
-        # Each doubling is needed while what those before it leave is too much.
-        doubled = np.zeros(len(order), bool)
-        doubled[order[left[:-1] > sum_allowed]] = True
-        doubled |= values.reshape(-1) > MOST_ABOVE * allowed
-        times = (doubled & open_steps.reshape(-1)).reshape(values.shape).sum(axis=1)
-        return np.minimum(rays * 2**times, np.maximum(highest, rays))[groups]
+        now = np.bincount(groups, variance) * rays ** (-2.0 * slope) / size if len(probes) else np.zeros(0)
+        return Forecast(groups, rays, size, now, slope, int(np.count_nonzero(scale)))
 
     def scale(self, probes: np.ndarray) -> np.ndarray:
         """What a relative error is relative to (m,): the probe's own norm, or for dim probes its geometric mean with the RMS of
@@ -140,6 +127,43 @@ class ErrorModel:
         alone = (alone * weight).sum(axis=1) / np.maximum(weight.sum(axis=1), 1e-300)
         pooled = (np.bincount(groups, alone, count) / np.maximum(np.bincount(groups, minlength=count), 1))[groups]
         return (1.0 - POOLED) * alone + POOLED * pooled, slope
+
+
+@dataclass(frozen=True, eq=False)
+class Forecast:
+    """Probes in ``groups`` (m,) that have ``rays`` (g,), ``size`` (g,) of them each, with a mean square of the relative errors of
+    ``now`` (g,) that falls with twice the power ``slope`` (g,) of the rays; ``lit`` probes have any light."""
+
+    groups: np.ndarray
+    rays: np.ndarray
+    size: np.ndarray
+    now: np.ndarray
+    slope: np.ndarray
+    lit: int
+
+    def rays_needed(self, target: float, highest: int) -> np.ndarray:
+        """Number of rays (m,), at least those that they have and at most ``highest``, at which the mean square over lit probes
+        of their errors, each relative to its scale, is expected to fall to that of ``target``; one for all of a group, doubled as
+        often as it takes, the worst first."""
+        if not len(self.groups):
+            return np.zeros(0, np.int64)
+        rays, size, now = self.rays, self.size, self.now
+        # A mean over few groups may be small by luck: it is taken for as much more as one standard error of it.
+        falls, allowed = 2.0 ** (-2.0 * self.slope), target**2 / (1.0 + np.sqrt(2.0 / (FREEDOM * len(size))))
+        # Probes in the dark, which have no error, do not make room for that of others.
+        sum_allowed = allowed * self.lit
+        steps = np.arange(max(1, int(np.ceil(np.log2(max(highest, 1) / max(rays.min(), 1)))) + 1))
+        values = now[:, None] * falls[:, None] ** steps
+        open_steps = rays[:, None] * 2.0**steps < highest
+        saved = np.where(open_steps, values * (1.0 - falls[:, None]) * size[:, None], 0.0).reshape(-1)
+        order = np.argsort(-np.where(open_steps, values, -1.0).reshape(-1), kind="stable")
+        left = float((now * size).sum()) - np.cumsum(np.append(0.0, saved[order]))
+        # Each doubling is needed while what those before it leave is too much.
+        doubled = np.zeros(len(order), bool)
+        doubled[order[left[:-1] > sum_allowed]] = True
+        doubled |= values.reshape(-1) > MOST_ABOVE * allowed
+        times = (doubled & open_steps.reshape(-1)).reshape(values.shape).sum(axis=1)
+        return np.minimum(rays * 2**times, np.maximum(highest, rays))[self.groups]
 
 
 def _disagreement(n1: int, n2: int, slope: np.ndarray) -> np.ndarray:

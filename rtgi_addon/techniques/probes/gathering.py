@@ -1,10 +1,8 @@
-"""A few rays from anywhere: the SH of light at probes and points in the air, and irradiance at receivers, from one surface cache.
+"""A few rays from anywhere: irradiance at receivers, and what light at points in the air is asked by, from one surface cache.
 
-What is found in both ways shares the cache, so what is left between them is interpolation and the noise of these rays. The noise
+Light at probes (started.py) shares the cache, so what is left between them is interpolation and the noise of these rays. The noise
 comes from two halves of each ray sequence, as in adaptive.py.
 """
-
-from typing import NamedTuple
 
 import numpy as np
 
@@ -15,47 +13,15 @@ from ...transport.rays.tracer import offset_origins
 from ...transport.vectors import dot
 from ..lamp_light import LampLight
 from ..lattice.placement import Placement
-from .bake import BLOCK_RAYS, ITEM_RAYS, mean_distances
-from .gather import GROUP, Gatherer, Item, gather
+from .gather import Gatherer, Item, gather
+from .item_rays import BLOCK_RAYS, ITEM_RAYS
 from .settings import ProbeSettings
 
-# Rays of a probe: fewer than any bake traces, since their noise is taken out.
-PROBE_RAYS = 128
 # Variance of a mean over both halves of a sequence, relative to the squared difference of the halves' means. Independent halves
 # would give 0.25; those of a scrambled Sobol sequence complement each other: 0.12 to 0.17 over four seeds on four samples.
 HALVES = 0.14
 # What a progress bar says meanwhile.
 RAYS_LABEL = "rays from points"
-
-
-class ProbeLight(NamedTuple):
-    """Sums (m, k, 3) of 4π·L·Y over the first and the second ``rays`` of m probes, and ``visibility`` (m, T², 2)."""
-
-    first: np.ndarray
-    second: np.ndarray
-    rays: int
-    visibility: np.ndarray
-
-    @property
-    def sh(self) -> np.ndarray:
-        """Coefficients (m, k, 3) float32 from all rays."""
-        return ((self.first + self.second) / (2 * self.rays)).astype(np.float32)
-
-
-def light_at_probes(context: LightContext, cache: SurfaceCache, settings: ProbeSettings, placement: Placement, seed: int,
-                    progress: Progress) -> ProbeLight:
-    """PROBE_RAYS rays from every measured probe of ``placement``. Raises Cancelled."""
-    gatherer = Gatherer(context, cache, placement, settings, seed)
-    count, rays = len(placement.positions), PROBE_RAYS // 2
-    side = settings.visibility_resolution
-    sums = np.zeros((2, count, (settings.order + 1) ** 2, 3))
-    distance, weight = np.zeros((count, side * side, 2), np.float32), np.zeros((count, side * side), np.float32)
-    items = items_of(np.flatnonzero(placement.measured), GROUP, PROBE_RAYS)
-    for item, gathered in zip(items, gather(gatherer, items, progress, RAYS_LABEL)[2], strict=True):
-        sums[int(item.first[0] >= rays), gathered.probes] += gathered.sh
-        distance[gathered.probes] += gathered.distance
-        weight[gathered.probes] += gathered.distance_weight
-    return ProbeLight(sums[0], sums[1], rays, mean_distances(distance, weight, side))
 
 
 def light_at_receivers(context: LightContext, cache: SurfaceCache, settings: ProbeSettings, points: np.ndarray,

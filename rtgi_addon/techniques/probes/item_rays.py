@@ -9,6 +9,10 @@ from .gather_kernels import ray_points
 
 # One emitter (and one bright world) sample for so many rays.
 RAYS_PER_LIGHT_SAMPLE = 8
+# Rays of a probe in one block: a multiple of what light samples come with, and those of the first round.
+BLOCK_RAYS = 64
+# Rays of one work item.
+ITEM_RAYS = 1 << 16
 # Dimensions of a group's sequence that are a ray's direction; what a hit samples of lamps follows.
 DIRECTION = 2
 

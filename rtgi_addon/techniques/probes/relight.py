@@ -51,6 +51,14 @@ class HitMemory:
         """Drop everything: this bake cannot be relit."""
         self.items = None
 
+    def take_over(self, other: "HitMemory") -> None:
+        """Remember what ``other`` does as well."""
+        self._rays += other._rays
+        if self.items is None or other.items is None or self._rays > MAX_KEPT_RAYS:
+            self.forget()
+            return
+        self.items += other.items
+
     def require(self) -> None:
         """Raises BakeError if nothing was kept."""
         if self.items is None:
@@ -101,8 +109,10 @@ def relight(bake, scene: Scene, lamp_light: LampLight, progress: Progress) -> Re
                 start=start)
     gatherer = bake.gatherer.under(context, cache)
     sums = relit_sums(bake.memory, gatherer, np.zeros_like(bake.model.total), bake.emitted, progress.span(CACHE_SOLVED, 1.0))
-    coefficients = sums / np.maximum(bake.model.rays, 1)[:, None, None]
-    probes = np.flatnonzero(bake.model.rays > 0)
+    # Rays of probes that nobody wants may be remembered as well.
+    traced = bake.model.rays > 0
+    coefficients = np.where(traced[:, None, None], sums / np.maximum(bake.model.rays, 1)[:, None, None], 0.0)
+    probes = np.flatnonzero(traced)
     if lamp_light and probes.size:
         coefficients[probes] += lamp_light.coefficients(bake.placement.positions[probes], bake.settings.order)
     grids = bake.cut(coefficients.astype(np.float32), np.full(len(coefficients), np.nan, np.float32))
