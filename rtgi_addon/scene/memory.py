@@ -27,6 +27,7 @@ _REMEDIES = {
     "shadow maps": "lower the resolution of the lamps' maps, or leave out lamps",
     "virtual lights": "lower the number of virtual lights, or of candidates for each",
     "cells": "lower the resolution of the volumes, or use fewer cascades",
+    "voxels": "lower the resolution, raise the voxel size, or use fewer cascades",
     "the surface cache": "allow a larger error, set a larger texel size, or place the volumes closer to what they light",
     "the fit to surfaces": "leave out --fit (Fit to Surfaces), or lower the volume's resolution",
     "rays": "use fewer threads, a larger error or a lower resolution",

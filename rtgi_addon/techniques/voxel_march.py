@@ -19,12 +19,12 @@ from ..errors import UsageError
 from ..numerics import sh
 from ..numerics.sampling import about, cosine_hemisphere, hash_u32, sobol_owen, unit_interval, wrapped
 from ..progress import Progress
+from ..transport.voxels.between import between
 from ..transport.voxels.cascades import by_cascade
 from ..transport.voxels.rays import march_on
-from ..transport.voxels.sweeps import sweep
+from ..transport.voxels.sweeps import irradiance_of_cells, sample_cells, sweep
 from .base import setting
 from .voxels.field import VoxelField
-from .voxels.lighting import irradiance_of_cells, sample_cells
 from .voxels.settings import VOXELS, VoxelSettings
 from .voxels.technique import VoxelTechnique
 
@@ -48,6 +48,11 @@ class MarchSettings(VoxelSettings):
     opacity: str = setting(COMPOSITING, "Opacity", "All voxels count for what they cover, or the first that is half covered counts "
                            "whole", choices=(COMPOSITING, FIRST_HIT))
 
+    @property
+    def hands_on(self) -> bool:
+        """See VoxelSettings."""
+        return super().hands_on or self.gather == CELLS
+
 
 class MarchField(VoxelField):
     """Irradiance by rays through the voxels; ``arriving`` (nz, ny, nx, 9, 3): what arrives in cells, where those are asked."""
@@ -58,12 +63,14 @@ class MarchField(VoxelField):
         super().__init__(context, settings, seed, voxels, progress)
         self.arriving = None
         if settings.gather == CELLS:
-            self.arriving = sweep(self.hierarchy, settings.rays, _ORDER, self._sky, context.threads, progress.span(0.9, 1.0))
+            self._standing = between(self.voxels, context.geometry)
+            self.arriving = sweep(self._standing, self.voxels.opacity, self.voxels.by_face(self.leaving), settings.rays, _ORDER,
+                                  self._sky, context.threads, progress.span(0.9, 1.0))
 
     def gather(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """See VoxelField."""
         if self.arriving is not None:
-            return irradiance_of_cells(self.voxels.grid, self.arriving, points, normals)
+            return irradiance_of_cells(self._standing, self.arriving, points, normals)
         rays = self.settings.rays
         # The same rays for the same place, whoever else is asked about.
         bits = np.ascontiguousarray(np.concatenate([points, normals], axis=1)).view(np.uint32)

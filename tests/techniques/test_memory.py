@@ -15,7 +15,8 @@ from rtgi_addon.techniques import get
 
 ROOT = Path(__file__).resolve().parents[2]
 # Settings at which what is measured is much more than a program and its threads.
-LARGE = {"rsm": {"resolution": 1024}, "vpl": {"lights": 16384}, "lpv": {"map_resolution": 256, "resolution": 32, "steps": 8}}
+LARGE = {"rsm": {"resolution": 1024}, "vpl": {"lights": 16384}, "lpv": {"map_resolution": 256, "resolution": 32, "steps": 8},
+         "voxel_march": {"resolution": 96, "light": "voxels", "bounces": 1, "rays": 8}}
 MEASURE = """
 import sys
 sys.path[:0] = [{root!r}, {root!r} + "/tests/support", {root!r} + "/benchmarks"]
@@ -39,7 +40,7 @@ def test_the_estimate_is_near_what_was_measured(name):
 
 @pytest.mark.parametrize(("name", "word", "remedy"), [
     ("rsm", "shadow maps", "resolution of the lamps' maps"), ("lpv", "shadow maps", "resolution of the lamps' maps"),
-    ("vpl", "virtual lights", "number of virtual lights")])
+    ("vpl", "virtual lights", "number of virtual lights"), ("voxel_march", "voxels", "use fewer cascades")])
 def test_too_little_is_said_before_it_is_taken(monkeypatch, name, word, remedy):
     monkeypatch.setattr(memory, "available_bytes", lambda: 12 << 20)
     technique = get(name)

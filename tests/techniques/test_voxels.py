@@ -13,8 +13,8 @@ from rtgi_addon.evaluate.stability.leaks import HALF, leak, two_rooms
 from rtgi_addon.evaluate.stability.parts import moved, rotation, turned, volume
 from rtgi_addon.numerics.sampling import fibonacci_sphere
 from rtgi_addon.progress import Progress
-from rtgi_addon.scene import World
-from rtgi_addon.techniques.voxels.lighting import VoxelLight
+from rtgi_addon.scene import SunLight, World
+from rtgi_addon.techniques.voxels.lighting import kept_share
 
 NAMES = ("cone_tracing", "voxel_march")
 NORMALS = fibonacci_sphere(24).astype(np.float32)
@@ -61,12 +61,20 @@ def test_light_that_voxels_send_each_other_nears_all_light(name):
 
 
 def test_further_bounces_keep_no_more_than_surfaces_reflect():
-    field = baked("cone_tracing", build.closed_box(albedo=0.5), light="voxels", bounces=1)
-    lit = VoxelLight(field.context, field.voxels, field.settings, field.seed)
-    sent = np.ones((len(field.voxels.seen.weight), 3), np.float32)
-    # What a sweep spreads may seem more than what was sent; what escapes is known.
-    assert lit.still_to_come(sent, 1.2 * sent) == pytest.approx(np.ones(3), rel=1e-3)
-    assert lit.still_to_come(sent, 0.2 * sent) == pytest.approx(np.full(3, 0.25), rel=1e-3)
+    weight, sent = np.float32([1, 3]), np.ones((2, 3), np.float32)
+    # What escapes is known; what a sweep spreads may seem more than what was sent.
+    assert kept_share(weight, sent, 0.4 * np.pi * sent, 0.2 * sent) == pytest.approx(np.full(3, 0.2))
+    assert kept_share(weight, sent, 2.0 * np.pi * sent, 1.2 * sent) == pytest.approx(np.full(3, 0.6))
+
+
+def test_what_escapes_elsewhere_takes_no_further_bounces_from_a_closed_room():
+    # Nearly all light falls on the ground and is gone; what is in the room stays.
+    room = build.closed_box(albedo=0.8)
+    ground = rooms.moved(build.plane("ground", 1.5), (0.0, 0.0, 1.8))
+    sun = SunLight("sun", np.float32([0, 0, -1]), np.float32([500, 500, 500]), angle=0.01)
+    scene = build.scene([*room.meshes, ground], list(room.materials), [*room.lights, sun], volumes=list(room.volumes))
+    cached = baked("cone_tracing", scene, light="surfaces").irradiance(POINTS, NORMALS).mean()
+    assert baked("cone_tracing", scene, light="voxels").irradiance(POINTS, NORMALS).mean() == pytest.approx(cached, rel=0.05)
 
 
 def test_voxels_reflect_the_sky_as_they_do_lamps():

@@ -26,7 +26,8 @@ from ..lattice.resample import resample
 from ..lpv.leaks import causes_of_cells
 from ..unfollowed import quoted, surfaces_of_maps
 from .beyond import goes_on
-from .lighting import light_voxels
+from .bounces import light_voxels
+from .memory import require_voxels
 from .place import beyond_grid, place_grids, thin_walls
 from .settings import MAPS, SURFACES, VoxelSettings
 from .shipped import ShippedVoxels, shipped
@@ -73,6 +74,7 @@ class VoxelField(Field):
         progress.stage("voxels")
         progress.step(0.0, "putting the scene into voxels")
         grids = place_grids(context.scene, np.array(context.geometry.bounds(), np.float64), settings)
+        require_voxels(context, grids, settings)
         meet = None if kernels is None else kernels.voxel_crossings
         # What holds nothing is left out; the outermost, which all others lie in, must hold something.
         held = [grid for grid in grids[:-1] if holds_geometry(context.geometry, grid)]

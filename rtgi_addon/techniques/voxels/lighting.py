@@ -6,11 +6,11 @@ into voxels; emissive surfaces are lit by themselves. The rest is the surface ca
 of the voxels, which is what an engine can do every few frames.
 """
 
+from functools import cached_property
+
 import numpy as np
 
-from ...numerics import sh
-from ...numerics.grid import trilinear
-from ...numerics.sampling import fibonacci_sphere, hash_u32, sobol_owen
+from ...numerics.sampling import hash_u32, sobol_owen
 from ...progress import Progress
 from ...transport.cache.surface_cache import SurfaceCache
 from ...transport.cache.surface_points import SurfacePoints
@@ -21,67 +21,33 @@ from ...transport.parallel import CHUNK, chunks, parallel_for
 from ...transport.paths.sources import Sources
 from ...transport.vectors import dot
 from ...transport.views.reflective_shadow_map import capture
-from ...transport.voxels import VoxelGrid, Voxels
+from ...transport.voxels import VoxelGrid, Voxels, voxelize
+from ...transport.voxels.between import Between, between
 from ...transport.voxels.grid import FACES
-from ...transport.voxels.hierarchy import build_hierarchy
 from ...transport.voxels.injection import inject
-from ...transport.voxels.sweeps import sweep
+from ...transport.voxels.sweeps import irradiance_of_cells, sweep
 from ..lpv.sources import map_views
-from .settings import MAPS, SURFACES, VoxelSettings
+from .settings import MAPS, VoxelSettings
 
 # Texels about the voxels, rays from each, and by how much the solution may be off: many are seen at once, so their noise averages.
 TEXELS, RAYS, TOLERANCE = 12000, 64, 2e-3
-# Directions of a sweep between voxels.
-SWEEPS = 64
 # Tells the numbers for lamps of some extent apart from all others of a seed: the letters vx.
 _STREAM = 0x7678
+# Directions of a sweep between voxels.
+SWEEPS = 64
 # Share of the light that a bounce may keep for a sum of all to be believed.
 _MOST_KEPT = 0.95
-# How far a lighting is when lamps are done, and what of that is theirs where there is a cache to solve.
-_LAMPS = 0.3
+# Voxels along the shortest side of a grid that shows rooms.
+_FEWEST = 12
 
 
-def light_voxels(context: LightContext, cascades: tuple[Voxels, ...], settings: VoxelSettings, seed: int, beyond,
-                 progress: Progress) -> list[np.ndarray]:
-    """Radiance (e, 3) float32 that leaves what the faces of the voxels of each of nested grids show, by point of ``Voxels.seen``;
-    ``beyond``(directions (k, 3)) is that (k, 3) of what lies outside them all. Raises Cancelled, BakeError."""
-    parts, direct = [VoxelLight(context, voxels, settings, seed) for voxels in cascades], []
-    shares = [progress.span(index / len(parts), (index + 1) / len(parts)) for index in range(len(parts))]
-    if settings.light == SURFACES:
-        return [part.direct(share.span(0.0, _LAMPS)) + part.cached(share.span(_LAMPS, 1.0))
-                for part, share in zip(parts, shares, strict=True)]
-    for index, part in enumerate(parts):
-        direct.append(part.direct(progress.span(_LAMPS * index / len(parts), _LAMPS * (index + 1) / len(parts))))
-    return _bounced(parts, settings, direct, beyond, progress.span(_LAMPS, 1.0))
-
-
-def _bounced(parts: "list[VoxelLight]", settings: VoxelSettings, direct: list[np.ndarray], beyond,
-             progress: Progress) -> list[np.ndarray]:
-    """What leaves of ``direct`` (e, 3), of what lies beyond, and of what voxels then send each other, grid by grid."""
-    steps = [beyond] if np.any(beyond(fibonacci_sphere(SWEEPS))) else []
-    steps += [_nothing] * settings.bounces
-    # Unlit voxels hide the sky from each other; then each reflects what the last one sent on.
-    total = direct
-    last = direct if len(steps) == settings.bounces else [np.zeros_like(light) for light in direct]
-    for number, outside in enumerate(steps):
-        found, around = [], None
-        # From the outermost in: what comes through the border of a grid has come through the next.
-        for index in reversed(range(len(parts))):
-            done = number + (len(parts) - 1 - index) / len(parts)
-            share = progress.span(done / len(steps), (done + 1 / len(parts)) / len(steps))
-            light, swept = parts[index].swept(last[index], outside, around, share)
-            found.insert(0, swept)
-            around = None if index == 0 else (parts[index].grid, light)
-        if outside is beyond:
-            total = last = [light + new for light, new in zip(direct, found, strict=True)]
-            continue
-        total = [light + new for light, new in zip(total, found, strict=True)]
-        if number == len(steps) - 1 and settings.further_bounces:
-            # The outermost grid knows all that the light meets.
-            more = parts[-1].still_to_come(last[-1], found[-1])
-            total = [light + new * more for light, new in zip(total, found, strict=True)]
-        last = found
-    return total
+def kept_share(weight: np.ndarray, before: np.ndarray, received: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """The share (3,) of the radiance ``before`` (e, 3) that a bounce keeps which makes ``after`` (e, 3) leave of the irradiance
+    ``received`` (e, 3), by ``weight`` (e,): no more than surfaces reflect where that arrives, should a sweep find more than was
+    sent. Of what all others add it makes the sum of a geometric series, as M. Cohen et al., "A Progressive Refinement Approach to
+    Fast Radiosity Image Generation", SIGGRAPH 1988, have for all of it."""
+    sent, got, left = (np.asarray(weight, np.float64) @ light for light in (before, received / np.float32(np.pi), after))
+    return np.minimum(left / np.maximum(np.maximum(sent, got), np.finfo(np.float64).tiny), _MOST_KEPT)
 
 
 class VoxelLight:
@@ -93,6 +59,11 @@ class VoxelLight:
         # Sources that shadow rays are sent to: where maps know lamps, what follows them is bright sky.
         self._first = context.lamps.count if settings.light == MAPS else 0
 
+    @cached_property
+    def standing(self) -> Between:
+        """What stands between the middles of the voxels."""
+        return between(self._voxels, self._context.geometry)
+
     @property
     def grid(self) -> VoxelGrid:
         """Of the voxels."""
@@ -103,33 +74,29 @@ class VoxelLight:
         direct = self._by_chunks(self._direct, progress, "lamps on voxels")
         return direct + self._mapped(progress) if self._settings.light == MAPS else direct
 
-    def swept(self, last: np.ndarray, beyond, around: tuple[VoxelGrid, np.ndarray] | None,
-              progress: Progress) -> tuple[np.ndarray, np.ndarray]:
+    def swept(self, last: np.ndarray, beyond, progress: Progress, around: np.ndarray | None = None) -> np.ndarray:
         """What arrives in the cells (nz, ny, nx, 9, 3) of what leaves what they show, ``last`` (e, 3), and of what lies beyond the
-        grid, or what arrives in those of the one ``around`` it; and what leaves of that (e, 3)."""
-        voxels, inflow = self._voxels, None
-        lit = build_hierarchy(voxels, voxels.by_face(last), levels=1)
-        if around is not None:
-            inflow = np.zeros((*self.grid.shape, *around[1].shape[3:]), np.float32)
-            inside = np.ones(self.grid.shape, bool)
-            inside[1:-1, 1:-1, 1:-1] = False
-            border = np.flatnonzero(inside)
-            inflow.reshape(self.grid.count, *inflow.shape[3:])[border] = sample_cells(*around, self.grid.centers_of(border))
-        light = sweep(lit, SWEEPS, 2, beyond, self._context.threads, progress, inflow)
-        return light, self._by_chunks(lambda rows: self._swept(light, rows), progress, "light between voxels")
+        grid, or, where it lies in another one, of what arrives ``around``, as `sweep` has both. Raises Cancelled."""
+        voxels, threads = self._voxels, self._context.threads
+        return sweep(self.standing, voxels.opacity, voxels.by_face(last), SWEEPS, 2, beyond, threads, progress, around)
 
-    def still_to_come(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-        """How much of ``after`` (e, 3), which a bounce made of ``before`` (e, 3), all further ones add (3,): each keeps the share
-        of the light that this one did, and no more than surfaces reflect in the mean. M. Cohen et al., "A Progressive Refinement
-        Approach to Fast Radiosity Image Generation", SIGGRAPH 1988, have such an ambient term of that mean alone; the share also
-        knows what escapes. Sweeps spread light and may find more of it than was sent: in corridor_door_ajar the share was 1.13, and
-        all further bounces twenty times the first."""
-        weight = self._voxels.seen.weight.astype(np.float64)
-        reflected = self._by_chunks(lambda rows: self._leaving(rows, lambda surface, _turn: np.float32(np.pi)), Progress(), "")
-        share = [weight @ leaving / np.maximum(weight @ whole, np.finfo(np.float64).tiny)
-                 for leaving, whole in ((after, before), (reflected, np.ones_like(reflected)))]
-        kept = np.minimum(np.minimum(*share), _MOST_KEPT)
-        return (kept / (1.0 - kept)).astype(np.float32)
+    def reflected(self, part: "VoxelLight", light: np.ndarray) -> np.ndarray:
+        """What leaves (e, 3) of the ``light`` (nz, ny, nx, 9, 3) that arrives in the cells of ``part``."""
+        return self._by_chunks(lambda rows: self._leaving(rows, lambda surface, _turn: _received(part, light, surface)),
+                               Progress(), "")
+
+    def kept(self, before: np.ndarray, light: np.ndarray, after: np.ndarray) -> np.ndarray:
+        """See kept_share: of what leaves ``before`` and ``after`` (e, 3) ``light`` (nz, ny, nx, 9, 3) has arrived."""
+        received = self._by_chunks(lambda rows: _received(self, light, self._surface(rows)), Progress(), "")
+        return kept_share(self._voxels.seen.weight, before, received, after)
+
+    def coarser(self) -> "VoxelLight":
+        """The same in voxels twice as large, or in these where so few of those are left that they show no rooms."""
+        grid, context = self.grid, self._context
+        if min(grid.resolution) < 2 * _FEWEST:
+            return self
+        half = VoxelGrid(grid.corner, 2.0 * grid.cell, tuple(-(-count // 2) for count in grid.resolution))
+        return VoxelLight(context, voxelize(context.geometry, context.surfaces, half, context.threads), self._settings, self._seed)
 
     def _by_chunks(self, work, progress: Progress, label: str) -> np.ndarray:
         """``work``(slice) → (m, 3) of all that voxels show, (e, 3)."""
@@ -207,29 +174,6 @@ class VoxelLight:
         return self._by_chunks(lambda rows: self._leaving(
             rows, lambda _surface, turn: cache.irradiance_rest[(texel if turn > 0 else behind)[rows]]), progress, "light on voxels")
 
-    def _swept(self, light: np.ndarray, rows: slice) -> np.ndarray:
-        """What a sweep found (nz, ny, nx, k, 3) makes leave (m, 3)."""
-        grid = self._voxels.grid
-        return self._leaving(rows, lambda surface, _turn: irradiance_of_cells(grid, light, surface.points, surface.face))
 
-
-def irradiance_of_cells(grid, light: np.ndarray, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Irradiance (n, 3) at ``points`` (n, 3) under ``normals`` (n, 3) by the cells in front of them: ``light`` (nz, ny, nx, 9, 3)
-    is what arrives there, in SH."""
-    coefficients = sample_cells(grid, light, points + normals * np.float32(grid.cell))
-    return np.maximum(sh.irradiance(coefficients, normals[:, None].astype(np.float32))[:, 0], 0.0).astype(np.float32)
-
-
-def sample_cells(grid, values: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """``values`` (nz, ny, nx, …) of the cells of ``grid`` at ``points`` (n, 3), interpolated: (n, …)."""
-    indices, weights = trilinear(grid.cells_of(points) - 0.5, grid.resolution)
-    flat = values.reshape(grid.count, -1)
-    total = np.zeros((len(points), flat.shape[1]), np.float32)
-    for corner in range(8):
-        total += weights[:, corner, None] * flat[indices[:, corner]]
-    return total.reshape(len(points), *values.shape[3:])
-
-
-def _nothing(directions: np.ndarray) -> np.ndarray:
-    """Radiance (k, 3) of what lies outside for light that stays within."""
-    return np.zeros((len(directions), 3), np.float32)
+def _received(part: VoxelLight, light: np.ndarray, surface: SurfacePoints) -> np.ndarray:
+    return irradiance_of_cells(part.standing, light, surface.points, surface.face)

@@ -31,7 +31,12 @@ class VoxelSettings:
                                   16, 4096)
     bounces: int = setting(1, "Cached Bounces", "How often voxels send each other light before it is gathered, where they light "
                            "themselves", "", 0, 32)
-    further_bounces: bool = setting(True, "Further Bounces", "Add what all further bounces would, each in proportion to the last")
+    further_bounces: bool = setting(True, "Further Bounces", "Add what all further bounces would, in voxels twice as large")
+
+    @property
+    def hands_on(self) -> bool:
+        """Whether voxels hand light on to each other."""
+        return self.light != SURFACES
 
     @property
     def live(self) -> bool:

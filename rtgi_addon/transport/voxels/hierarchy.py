@@ -123,7 +123,7 @@ def _level(size: int, shape, cells: _Cells, walls: Walls, afar: bool) -> Level:
     padded = tuple(extent + 2 for extent in shape)
     row = np.zeros(int(np.prod(padded)), np.int32)
     row[((place[:, 2] + 1) * padded[1] + place[:, 1] + 1) * padded[2] + place[:, 0] + 1] = np.arange(1, count)
-    normal, flat = _normals(cells)
+    normal, flat = planes_of(cells)
     met = np.maximum(opacity, np.finfo(np.float32).tiny)
     depth, glow = np.zeros((count, 3), np.float32), np.zeros((count, FACES, 3), np.float32)
     optical = np.minimum(-np.log(np.maximum(1.0 - opacity, np.exp(-OPAQUE))), OPAQUE)
@@ -143,11 +143,17 @@ def _level(size: int, shape, cells: _Cells, walls: Walls, afar: bool) -> Level:
         plane = np.zeros((count, 5), np.float32)
         offset = (normal * cells.middle).sum(axis=1)
         plane[1:, :3], plane[1:, 3] = normal, offset
-        plane[1:, 4] = np.where(flat, np.minimum(_FILLED * cells.area / np.maximum(section(normal, offset), _CORNER), 1.0), 0.0)
+        plane[1:, 4] = np.where(flat, filled(cells.area, normal, offset), 0.0)
         held = 1 + np.flatnonzero(~flat & (cells.plates != NO_PLATE).any(axis=1))
         plane[held, :3], plane[held, 3:] = cells.plates[held - 1], (0.0, -1.0)
     return Level(size, padded, row, depth, glow.reshape(-1, 3), sheet, shown.reshape(-1, 3),
                  np.append(False, adds), plane, too_wide(walls, size, padded))
+
+
+def filled(area: np.ndarray, normal: np.ndarray, offset: np.ndarray) -> np.ndarray:
+    """How much (m,) of the planes with unit ``normal`` (m, 3), ``offset`` (m,) from cells' middles, surfaces of ``area`` (m,), in
+    faces of a cell, fill of what lies in the cells."""
+    return np.minimum(_FILLED * area / np.maximum(section(normal, offset), _CORNER), 1.0)
 
 
 def section(normal: np.ndarray, offset: np.ndarray) -> np.ndarray:
@@ -162,7 +168,7 @@ def section(normal: np.ndarray, offset: np.ndarray) -> np.ndarray:
     return total / (2.0 * a * b * c)
 
 
-def _normals(cells: _Cells) -> tuple[np.ndarray, np.ndarray]:
+def planes_of(cells: "_Cells | Voxels") -> tuple[np.ndarray, np.ndarray]:
     """The normal (m, 3) of the plane that each cell's surfaces lie in best, and whether (m,) bool they lie in it, and are solid."""
     tensor = np.empty((len(cells.lie), 3, 3))
     for index, (row, column) in enumerate(((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))):

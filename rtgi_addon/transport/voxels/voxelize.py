@@ -27,7 +27,7 @@ from .walls import Walls, find_walls
 # Lines along each side of a column of cells.
 LINES = 4
 # Of the lines of a face so many carry its light, spread as rooks on a chess board: one of each row and column.
-_ROOKS = {1: (0,), 2: (0, 1), 3: (1, 2, 0), 4: (1, 3, 0, 2)}
+ROOKS = {1: (0,), 2: (0, 1), 3: (1, 2, 0), 4: (1, 3, 0, 2)}
 # How far, RMS in cells, the places where lines meet a cell's surfaces may lie about a plane across them; where there is none.
 _LEVEL, NO_PLATE = 0.003, np.float32(9.0)
 # Coverage from which on a surface lets nothing through.
@@ -227,7 +227,7 @@ def _composite(key: np.ndarray, alpha: np.ndarray) -> np.ndarray:
 
 def _carriers(line: np.ndarray, lines: int) -> np.ndarray:
     """Which (n,) bool of the crossings of ``line`` (n,) carry light: as many lines of a cell as it has rows of them."""
-    rooks = _ROOKS.get(lines)
+    rooks = ROOKS.get(lines)
     if rooks is None:
         return np.ones(len(line), bool)
     table = np.zeros(lines**2, bool)

@@ -74,6 +74,8 @@ FILES: dict[str, str] = {
         "die Zahl der virtuellen Lichter senken, oder die der Kandidaten für jedes",
     "lower the resolution of the volumes, or use fewer cascades":
         "die Auflösung der Volumen senken, oder weniger Kaskaden nehmen",
+    "lower the resolution, raise the voxel size, or use fewer cascades":
+        "die Auflösung senken, größere Voxel setzen, oder weniger Kaskaden nehmen",
     "there is not enough memory ({0})": "der Speicher reicht nicht ({0})",
     "close other programs, raise the limit if one is set, or lower resolution, order and sizes of images":
         "andere Programme schließen, eine gesetzte Grenze anheben, oder Auflösung, Ordnung und Bildgrößen senken",

@@ -79,8 +79,8 @@ VOXEL_LABELS: dict[str, str] = {
     "Cached Bounces": "Gespeicherte Reflexionen",
     "How often voxels send each other light before it is gathered, where they light themselves":
         "Wie oft Voxel einander Licht zusenden, bevor es gesammelt wird, wo sie sich selbst beleuchten",
-    "Add what all further bounces would, each in proportion to the last":
-        "Hinzufügen, was alle weiteren Reflexionen brächten, jede im Verhältnis zur letzten",
+    "Add what all further bounces would, in voxels twice as large":
+        "Hinzufügen, was alle weiteren Reflexionen brächten, in doppelt so großen Voxeln",
     "Voxels": "Voxel",
     "The cubes that cone tracing and voxel marching see the scene in: in the light that their faces send out, or white for what "
     "they block of it":
