@@ -11,6 +11,7 @@ from ... import techniques
 from ...effects import EFFECT_PASSES, Chosen, concerned, notes_of
 from ...effects.gathering import ERROR, GATHERS, MOST_SAMPLES, by_rays, reached_text
 from ...effects.picture import draw_pictures
+from ...effects.surroundings import eye_inside
 from ...errors import BakeError, UsageError
 from ...exchange.bundle import read_bundle
 from ...exchange.exr import write_exr
@@ -163,6 +164,7 @@ def _run(arguments: argparse.Namespace, session: Session) -> PictureReport:
     if bundle is not None:
         require_of_scene(bundle.path, scene)
     camera = _camera(scene, arguments.camera, arguments.scale)
+    told = (*told, eye_inside(scene, camera.name, camera.world_from_camera[:3, 3], arguments.threads))
     read = time.monotonic()
     if bundle is None and rays and not scene.media:
         field, technique = None, "rays"
@@ -171,7 +173,8 @@ def _run(arguments: argparse.Namespace, session: Session) -> PictureReport:
                            volume=arguments.volume, progress=progress.span(EXTRACT_SHARE, _DRAW_FROM),
                            spheres=sphere_settings(arguments) if any(entry.effect.reads_spheres for entry in chosen) else None,
                            atlas=atlas_settings(arguments))
-        technique = arguments.technique
+        # A bundle said so when it was baked.
+        technique, told = arguments.technique, (*told, *field.notes)
     else:
         field, technique = bundle.field, f"{bundle.path.name} ({bundle.manifest['technique']})"
     baked = time.monotonic()

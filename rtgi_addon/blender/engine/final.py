@@ -9,6 +9,7 @@ from ...effects import Chosen, notes_of
 from ...effects.atlas.relight import STALE_ATLAS, is_left_out
 from ...effects.gathering import by_rays, reached_text
 from ...effects.picture import draw_pictures
+from ...effects.surroundings import eye_inside
 from ...errors import BakeError, Cancelled
 from ...progress import Progress
 from ...scene import Camera, Scene, drawn_otherwise
@@ -46,7 +47,8 @@ def render(engine, depsgraph) -> None:
     effects = by_rays(effects) if rays else effects
     # A picture by rays looks at a bake only for what media scatter more than once.
     looks_at_bake = bool(scene.media) or not rays
-    for note in (shown.note if looks_at_bake else "", drawn_otherwise(scene), *notes_of(effects, scene)):
+    inside = eye_inside(scene, camera.name, camera.world_from_camera[:3, 3])
+    for note in (shown.note if looks_at_bake else "", inside, drawn_otherwise(scene), *notes_of(effects, scene)):
         if note:
             engine.report({"INFO"}, sentence(note))
     engine.update_stats("", sentence("Relighting"))

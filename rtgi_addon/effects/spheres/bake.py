@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...numerics import octahedral
-from ...numerics.sampling import fibonacci_sphere, hash_u32, sobol_owen
+from ...numerics.sampling import hash_u32, sobol_owen
 from ...progress import Progress
 from ...scene import Scene
 from ...scene.content import content_hash
@@ -28,14 +28,12 @@ from ..media.lighting import Surroundings
 from ..ray_traced.diffuse import sent_along
 from ..ray_traced.glossy import Ends, Paths, at_hits, onward
 from ..ray_traced.lamps import MirroredLamps
+from ..surroundings import LOOKS, look_around, names_of
 from .maps import SphereMap, SphereProbes
 from .prefilter import prefiltered
 from .settings import SphereSettings
 
 _STREAM = 0x5B43
-# Rays that look at what is about a probe before it is baked, and the share of them on the inside of solids from which on it lies in
-# one.
-_LOOKS, _INSIDE = 1024, 0.5
 # What is cut off concerns this share of all directions at least where it is told.
 _TOLD = 0.005
 # What a half float holds.
@@ -99,35 +97,22 @@ def _baked(scene: Scene, field: Field | None, settings: SphereSettings, seed: in
 
 def surroundings(context: LightContext, probe: SphereProbe) -> tuple[list[str], bool]:
     """What a user should know of where ``probe`` lies, and whether it can be baked there."""
-    directions = fibonacci_sphere(_LOOKS)
-    origins = np.broadcast_to(probe.centre_world.astype(np.float32), directions.shape)
-    hits = context.tracers.diffuse.intersect(origins, directions)
-    rows = np.flatnonzero(hits.primitive >= 0)
-    primitive, distance = hits.primitive[rows], hits.t[rows]
-    behind = np.einsum("ij,ij->i", context.geometry.normals_world[primitive], directions[rows]) > 0
-    inside, notes = np.zeros(len(rows), bool), []
-    inside[behind] = context.solids.is_solid(primitive[behind])
-    if inside.sum() > _INSIDE * _LOOKS:
-        notes.append(f"sphere probe {probe.name} lies inside {_names(context, primitive[inside])} and is left out: move it into "
-                     "the open")
+    around = look_around(context, probe.centre_world)
+    primitive, distance, notes = around.primitive, around.distance, []
+    if around.enclosed:
+        notes.append(f"sphere probe {probe.name} lies inside {names_of(context, primitive[around.inside])} and is left out: move "
+                     "it into the open")
         return notes, False
     near, far = distance < probe.clip_start, distance > probe.clip_end
-    if near.sum() >= _TOLD * _LOOKS:
-        notes.append(f"sphere probe {probe.name} does not see {_names(context, primitive[near])} in {near.sum() * 100 // _LOOKS} % "
-                     f"of all directions, nearer than its Clip Start of {probe.clip_start:g} m: lower that, or what is behind "
+    if near.sum() >= _TOLD * LOOKS:
+        notes.append(f"sphere probe {probe.name} does not see {names_of(context, primitive[near])} in {near.sum() * 100 // LOOKS} "
+                     f"% of all directions, nearer than its Clip Start of {probe.clip_start:g} m: lower that, or what is behind "
                      "shows in their place")
-    if far.sum() >= _TOLD * _LOOKS:
-        notes.append(f"sphere probe {probe.name} does not see {_names(context, primitive[far])} in {far.sum() * 100 // _LOOKS} % "
+    if far.sum() >= _TOLD * LOOKS:
+        notes.append(f"sphere probe {probe.name} does not see {names_of(context, primitive[far])} in {far.sum() * 100 // LOOKS} % "
                      f"of all directions, beyond its Clip End of {probe.clip_end:g} m: raise that, or the world shows in their "
                      "place")
     return notes, True
-
-
-def _names(context: LightContext, primitive: np.ndarray) -> str:
-    """The instance that most of the triangles belong to, and whether there are others."""
-    found, counts = np.unique(context.geometry.instance[primitive], return_counts=True)
-    name = context.scene.instances[int(found[np.argmax(counts)])].name
-    return name if len(found) == 1 else f"{name} and {len(found) - 1} more"
 
 
 class _Baking:

@@ -1,4 +1,5 @@
-"""Which triangles bound solid matter: closed, outward-facing shells that keep light out, with no lamp, camera or emitter inside.
+"""Which triangles bound solid matter: closed, outward-facing shells that keep light out, with no lamp, camera or emitter inside,
+and the shells of the rooms in them, which face inwards and may have all of that.
 
 A hit on the back of such a triangle means that the ray started inside a wall or a piece of furniture. The back of an open
 sheet, or of a box that serves as a room, means nothing of the kind.
@@ -54,17 +55,21 @@ class Solids:
             areas = self._geometry.areas[rows].astype(np.float64)
             through = np.bincount(label, areas * self._surfaces.passed(rows), minlength=len(closed))
             keep &= through <= LIGHT_TIGHT * np.bincount(label, areas, minlength=len(closed))
-        for component in np.flatnonzero(keep):
-            keep[component] = not self._holds_anchor(triangles[label == component], instance)
+        shells = {int(component): triangles[label == component] for component in np.flatnonzero(keep)}
+        rooms = _rooms(shells, {int(component): triangles[label == component] for component in np.flatnonzero(closed & ~outward)})
+        for component, shell in shells.items():
+            keep[component] = not self._holds_anchor(shell, [room for room, _ in rooms[component]], instance)
+            keep[[number for _, number in rooms[component]]] = keep[component]
         return keep[label]
 
-    def _holds_anchor(self, triangles: np.ndarray, instance: int) -> bool:
+    def _holds_anchor(self, shell: np.ndarray, rooms: list[np.ndarray], instance: int) -> bool:
+        """Whether a lamp, a camera or an emitter lies in what ``shell`` (t, 3, 3) bounds, and in none of its ``rooms``."""
         if self._anchors is None:
             self._anchors = self._find_anchors()
         points, owners = self._anchors
-        low, high = triangles.reshape(-1, 3).min(axis=0), triangles.reshape(-1, 3).max(axis=0)
-        inside_box = np.all((points > low) & (points < high), axis=1) & (owners != instance)
-        return any(winding_number(triangles, point) > 0.5 for point in points[inside_box])
+        points = points[_within(points, _box(shell)) & (owners != instance)]
+        return any(winding_number(shell, point) > 0.5 and not any(winding_number(room, point) > 0.5 for room in rooms)
+                   for point in points)
 
     def _find_anchors(self) -> tuple[np.ndarray, np.ndarray]:
         points = [light.position_world for light in self._scene.lights if hasattr(light, "position_world")]
@@ -75,6 +80,34 @@ class Solids:
         points += list(self._geometry.triangles_world[emissive[first]].mean(axis=1))
         owners += list(instances)
         return np.array(points, np.float64).reshape(-1, 3), np.array(owners, np.int64)
+
+
+def _rooms(shells: dict[int, np.ndarray], inwards: dict[int, np.ndarray]) -> dict[int, list[tuple[np.ndarray, int]]]:
+    """For each of the ``shells`` by number, of triangles (t, 3, 3), those of ``inwards`` that lie in it and in no smaller one, with
+    their numbers."""
+    rooms: dict[int, list[tuple[np.ndarray, int]]] = {number: [] for number in shells}
+    if not shells or not inwards:
+        return rooms
+    numbers = np.array(list(shells))
+    boxes = np.array([_box(shell) for shell in shells.values()])
+    by_size = np.argsort(np.prod(boxes[:, 1] - boxes[:, 0], axis=1), kind="stable")
+    for number, room in inwards.items():
+        point = room[0, 0]
+        about = by_size[np.all((boxes[by_size, 0] < point) & (boxes[by_size, 1] > point), axis=1)]
+        shell = next((int(numbers[row]) for row in about if winding_number(shells[int(numbers[row])], point) > 0.5), None)
+        if shell is not None:
+            rooms[shell].append((room, number))
+    return rooms
+
+
+def _box(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The corners of the box about ``triangles`` (t, 3, 3)."""
+    points = triangles.reshape(-1, 3)
+    return points.min(axis=0), points.max(axis=0)
+
+
+def _within(points: np.ndarray, box: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    return np.all((points > box[0]) & (points < box[1]), axis=1)
 
 
 def closed_components(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:

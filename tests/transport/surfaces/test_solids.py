@@ -120,6 +120,18 @@ def test_a_box_built_as_a_room_counts_by_what_is_in_it():
     assert not solid(glowing).any()
 
 
+def test_walls_of_real_thickness_are_solid_about_what_is_in_their_rooms():
+    """One mesh as buildings are modelled: an outer shell, a room in it that faces inwards, a crate in the room."""
+    shell, room, crate = build.cube("shell", 2.0), build.cube("room", 1.5, inward=True), build.cube("crate", 0.3)
+    house = joined(shell, room, crate)
+    camera = Camera("eye", build.transform((0.5, 1.0, 0)), np.eye(4), (10, 10))
+    for lamp, walls, furniture in (((1, 0, 0), True, True), ((1.8, 0, 0), False, True), ((0.1, 0, 0), True, False)):
+        scene = build.scene([house], lights=[build.point_light(lamp)])
+        assert solid(replace(scene, cameras=(camera,))).tolist() == [walls] * 24 + [furniture] * 12
+    # A room that is in no shell is the box that it always was.
+    assert not solid(build.scene([joined(build.cube(), moved(room, (5, 0, 0)))]))[12:].any()
+
+
 def test_lamps_outside_and_suns_make_no_room():
     crate = build.cube("crate")
     sun = SunLight("sun", np.float32([0, 0, -1]), np.ones(3, np.float32))

@@ -30,6 +30,8 @@ SPHERES: dict[str, str] = {
         "die Kugelsonden {0} sehen stellenweise mehr als {1} W/(sr m²), was darauf gekürzt wird",
     "sphere probe {0} lies inside {1} and is left out: move it into the open":
         "die Kugelsonde {0} liegt in {1} und entfällt: ins Freie schieben",
+    "camera {0} lies inside {1}, which no light gets into: move it into the open":
+        "die Kamera {0} liegt in {1}, wohin kein Licht kommt: ins Freie schieben",
     "sphere probe {0} does not see {1} in {2} % of all directions, nearer than its Clip Start of {3} m: lower that, or what is "
     "behind shows in their place":
         "die Kugelsonde {0} sieht {1} in {2} % aller Richtungen nicht, näher als ihr Beschneidungsbeginn von {3} m: senken, sonst "
