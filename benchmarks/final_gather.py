@@ -1,7 +1,7 @@
 """How near pictures by the effect `ray_traced` come to Cycles, and how much faster than Cycles without its denoiser.
 
     python benchmarks/final_gather.py [samples...] [--samples N] [--cycles-samples 512] [--again] [--set NAME=VALUE]
-        [--effect screen_reflections]
+        [--effect screen_reflections] [--fit] [--density F]
 
 Both draw the combined picture of a sample's own camera at 320 x 180 on the CPU, the effect at its own defaults and without a bake:
 its light cache is part of its time. It has samples where the picture needs them until it thinks that it is within what the sample
@@ -14,8 +14,9 @@ of one render, from (a - b)^2; time to an error falls with the square, so the ra
 over those that the effect took: user time of all threads, opening the file and reading the scene left out on both sides. Cycles'
 pictures and their time are kept in benchmarks/results (``--again`` renders anew). Sheets of the pictures go there, too.
 
-``--effect`` measures another effect; one that is not of the stage "light" on the picture that probes at default settings light,
-whose bake is no part of its time.
+``--effect`` measures another effect; one that is not of the stage "light" on the picture that probes at default settings light, and
+sphere probes where it shows them, as ``render --effect`` does; their bake is no part of its time. ``--fit`` fits the probes, and
+``--density F`` refines their lattices F times along every side.
 """
 
 import argparse
@@ -39,6 +40,7 @@ from rtgi_addon.effects.base import apply_all  # noqa: E402
 from rtgi_addon.effects.gathering import MOST_SAMPLES  # noqa: E402
 from rtgi_addon.effects.lit import draw_frame, light_context  # noqa: E402
 from rtgi_addon.effects.picture import draw_pictures  # noqa: E402
+from rtgi_addon.effects.spheres.settings import SphereSettings  # noqa: E402
 from rtgi_addon.jobs.field import bake_field  # noqa: E402
 from rtgi_addon.scene import Scene  # noqa: E402
 from rtgi_addon.techniques import Field  # noqa: E402
@@ -113,14 +115,16 @@ def measure(name: str, options, say) -> dict:
     """One sample's row, and its sheet."""
     cycles = kept(f"gather_{name}", options.cycles_samples,
                   lambda: render_cycles(name, options.cycles_samples, options.threads), options.again)
-    open_sample(name, SIZE)
+    open_sample(name, SIZE, options.density)
     scene, effect = extract_scene(), options.chosen.effect
     row = {"sample": name, "cycles_samples": cycles["samples"], "cycles_seconds": float(cycles["seconds"]), "steps": []}
     if options.samples is None:
         found, mean, thought, taken, seen = draw_within(scene, HELD_TO.get(name, 0.02), options.chosen, options.threads)
         row["thought"], pictures, seconds = thought, {mean: found}, {mean: taken}
     else:
-        field = None if effect.stage == "light" else bake_field(scene, "probes", threads=options.threads)
+        field = None if effect.stage == "light" else bake_field(
+            scene, "probes", {"fit": options.fit}, threads=options.threads,
+            spheres=SphereSettings() if effect.reads_spheres else None)
         pictures, seconds, seen = draw(scene, options.samples, options.chosen, options.threads, field)
     for count, picture in pictures.items():
         off, noise, bias = errors(picture, cycles["pictures"], seen)
@@ -152,6 +156,8 @@ def main() -> int:
     parser.add_argument("--threads", type=int)
     parser.add_argument("--again", action="store_true")
     parser.add_argument("--effect", default="ray_traced")
+    parser.add_argument("--fit", action="store_true", help="fit the probes to what surfaces read")
+    parser.add_argument("--density", type=float, default=1.0, help="lattices this many times as fine")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="settings of the effect")
     after = sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else sys.argv[1:]
     options = parser.parse_args(after)
