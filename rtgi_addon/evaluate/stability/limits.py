@@ -92,7 +92,7 @@ LIMITS: dict[str, dict[str, Limit]] = {
     "reflection-thickness": {
         "screen_reflections": Limit(0.55, "what something hides from the eye is not in the picture, and what is thick smears"),
         "ray_traced": Limit(1e-5)},
-    "sphere-roughness": {"screen_reflections": Limit(0.04)},
+    "sphere-roughness": {"screen_reflections": Limit(0.05)},
     "sphere-wall": {"screen_reflections": Limit(1e-4)},
     "reflection-hidden": {"screen_reflections": Limit(0.68, "what something hides from the eye is not in the picture"),
                           "ray_traced": Limit(1e-5)},
