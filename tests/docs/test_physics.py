@@ -44,7 +44,7 @@ def test_ringing():
     seen = 0
     for name, *cells in rows("reconstruction"):
         light = sh.evaluate(axis, int(re.search(r"order (\d)", name)[1]))[0][:, None]
-        if "windowed" in name:
+        if "deringed" in name:
             light = reconstruction.dering(light[None].astype(np.float32))[0]
         method = next((method for word, method in methods.items() if word in name), reconstruction.linear)
         found = method(light, normals)[:, 0]
@@ -52,7 +52,8 @@ def test_ringing():
         assert computed == pytest.approx([value(cell) for cell in cells], abs=6e-4), name
         seen += 1
     assert seen == 6
-    assert "42 % of a peak" in TEXT and 1 - computed[2] == pytest.approx(0.42, abs=0.005)
+    # Of the last row, against the linear one above it, as the text rounds them.
+    assert "up to 10 % at order 2" in TEXT and 1 - computed[2] / 1.063 == pytest.approx(0.1, abs=0.01)
 
 
 def test_a_cosine_sky_by_order():

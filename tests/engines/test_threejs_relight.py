@@ -43,9 +43,10 @@ def test_node_agrees(node, install_three, tmp_path, release):
 
 @pytest.mark.parametrize(("old", "new", "failing"), [
     ("(1 - fu) * fv]", "(1 - fu) * fu]", "a sun at noon"),
-    ("4 * strength", "5 * strength", "as it was baked"), ("seen * basis * r", "basis * r", "a sky with bright spots"),
+    ("shares = [reach * ray[0]", "shares = [0.9 * reach * ray[0]", "as it was baked"),
+    ("seen * basis * r", "basis * r", "a sky with bright spots"),
     ("replaced ? [0, 0, 0]", "false ? [0, 0, 0]", "an overcast sky"), ("y < 0 ? side * side : 0", "0", "a sun below the horizon"),
-], ids=["shares", "window", "seen", "replaced", "below"])
+], ids=["shares", "deringing", "seen", "replaced", "below"])
 def test_node_finds_damage(node, install_three, whole, old, new, failing):
     script = installed(whole, install_three) / "rtgi/RTGIRelight.js"
     text = script.read_text()

@@ -4,24 +4,24 @@
 //   vec4 rtgi_entry(int row, int texel)                   // what shines, see rtgi_relit
 // exchange/engines/transfer.py says what the columns are.
 
-// The least of mean + linear . n + values . (n * n) over unit vectors n, less the mean: by the dual of this problem, which has no gap,
-// and Newton's steps after J. More and D. Sorensen, "Computing a Trust Region Step", 1983.
-float rtgi_least(vec3 linear, vec3 values) {
-	vec3 least = 0.5 * abs(linear) - values;
+// Where linear . n + values . (n * n) over unit vectors n is least: what the first term is there, and the sum. By the dual of this
+// problem, which has no gap, and Newton's steps after J. More and D. Sorensen, "Computing a Trust Region Step", 1983.
+vec2 rtgi_least(vec3 linear, vec3 values) {
+	vec3 line = 0.5 * linear;
+	vec3 least = abs(line) - values;
 	float low = max(least.x, max(least.y, least.z));
 	float shift = low;
-	vec3 part = vec3(0.0);
-	for (int step = 0; step < 7; step++) {
+	for (int step = 0; step < 8; step++) {
 		vec3 gap = max(values + shift, vec3(1e-30));
-		part = 0.5 * linear / gap;
+		vec3 part = line / gap;
 		float square = dot(part, part);
 		float slope = dot(part * part, 1.0 / gap);
 		if (slope > 0.0) {
 			shift = max(low, shift + (sqrt(square) - 1.0) * square / slope);
 		}
 	}
-	part = 0.5 * linear / max(values + shift, vec3(1e-30));
-	return -shift - 0.5 * dot(linear, part);
+	float half_first = dot(line, line / max(values + shift, vec3(1e-30)));
+	return vec2(-2.0 * half_first, -shift - half_first);
 }
 
 // One of Jacobi's rotations: of the elements pp, qq and pq of a symmetric matrix, of those of the third axis, and of a vector.
@@ -66,21 +66,22 @@ void rtgi_axes(vec3 first, vec4 second, float ninth, out vec3 linear, out vec3 v
 	values = vec3(xx, yy, zz);
 }
 
-// The window of band 1 and of band 2 (P.-P. Sloan, "Deringing Spherical Harmonics", 2017).
-vec2 rtgi_window(float strength) {
-	return vec2(1.0 / (1.0 + 4.0 * strength), 1.0 / (1.0 + 36.0 * strength));
+// How far bands 1 and 2, scaled along a ray of shares, reach until irradiance is 0 in some direction and colour, and what of it is
+// band 1 and band 2 there.
+vec3 rtgi_border(vec2 ray, vec3 mean, mat3 linear, mat3 values) {
+	vec3 border = vec3(1e30, 0.0, 0.0);
+	for (int colour = 0; colour < 3; colour++) {
+		vec2 least = rtgi_least(ray.x * linear[colour], ray.y * values[colour]);
+		float reach = least.y < 0.0 ? mean[colour] / -least.y : 1e30;
+		if (reach < border.x) {
+			border = vec3(reach, least.x, least.y - least.x);
+		}
+	}
+	return border;
 }
 
-// The least irradiance of three colours under a window.
-float rtgi_lowest(float strength, vec3 mean, mat3 linear, mat3 values) {
-	vec2 window = rtgi_window(strength);
-	float lowest = mean.x + rtgi_least(window.x * linear[0], window.y * values[0]);
-	lowest = min(lowest, mean.y + rtgi_least(window.x * linear[1], window.y * values[1]));
-	return min(lowest, mean.z + rtgi_least(window.x * linear[2], window.y * values[2]));
-}
-
-// Windows a probe's coefficients as weakly as leaves no negative irradiance, as the bake's own look-up does when it opens a bundle
-// (techniques/lattice/reconstruction.py).
+// Scales a probe's bands 1 and 2 by the shares nearest to 1 that leave no negative irradiance, as the bake's own look-up does when it
+// opens a bundle (techniques/lattice/reconstruction.py says why these are found so, _nearest_shares).
 void rtgi_dering(inout vec3 c0, inout vec3 c1, inout vec3 c2, inout vec3 c3, inout vec3 c4, inout vec3 c5, inout vec3 c6,
 		inout vec3 c7, inout vec3 c8) {
 	vec3 lit = vec3(c0.x > 0.0 ? 1.0 : 0.0, c0.y > 0.0 ? 1.0 : 0.0, c0.z > 0.0 ? 1.0 : 0.0);
@@ -110,37 +111,43 @@ void rtgi_dering(inout vec3 c0, inout vec3 c1, inout vec3 c2, inout vec3 c3, ino
 	rtgi_axes(vec3(c1.z, c2.z, c3.z), vec4(c4.z, c5.z, c6.z, c7.z), c8.z, linear_b, values_b);
 	mat3 linear = mat3(linear_r, linear_g, linear_b);
 	mat3 values = mat3(values_r, values_g, values_b);
-	if (rtgi_lowest(0.0, mean, linear, values) >= 0.0) {
+	if (rtgi_border(vec2(1.0), mean, linear, values).x >= 1.0) {
 		return;
 	}
-	// Strengths that serve need not be one interval: up a ladder to the first that does, then between it and the one before.
+	// By the squares of A1 / A0 and A2 / A0.
+	vec2 power = vec2(4.0 / 9.0 * (dot(c1, c1) + dot(c2, c2) + dot(c3, c3)),
+			1.0 / 16.0 * (dot(c4, c4) + dot(c5, c5) + dot(c6, c6) + dot(c7, c7) + dot(c8, c8)));
+	power += 1e-6 * (power.x + power.y);
 	float low = 0.0;
-	float high = 1e4;
-	for (int rung = 0; rung < 33; rung++) {
-		float strength = pow(10.0, 0.25 * float(rung) - 4.0);
-		if (rtgi_lowest(strength, mean, linear, values) >= 0.0) {
-			high = strength;
-			break;
+	float high = 1.0;
+	vec2 shares = vec2(0.0);
+	for (int bisection = 0; bisection < 21; bisection++) {
+		float turn = 0.5 * (low + high);
+		vec2 ray = vec2(1.0 - turn, turn);
+		vec3 border = rtgi_border(ray, mean, linear, values);
+		float nearest = dot(power, ray) / dot(power, ray * ray);
+		float edge = 1.0 / max(ray.x, ray.y);
+		float reach = min(min(border.x, nearest), edge);
+		shares = reach * ray;
+		vec2 grows = border.yz / max(ray, vec2(1e-30));
+		if (reach < border.x) {
+			grows = reach < edge ? -ray : (turn < 0.5 ? vec2(-1.0, 0.0) : vec2(0.0, -1.0));
 		}
-		low = strength;
-	}
-	for (int bisection = 0; bisection < 16; bisection++) {
-		float middle = 0.5 * (low + high);
-		if (rtgi_lowest(middle, mean, linear, values) >= 0.0) {
-			high = middle;
+		vec2 left = power * (1.0 - shares);
+		if (left.x * grows.y > left.y * grows.x) {
+			low = turn;
 		} else {
-			low = middle;
+			high = turn;
 		}
 	}
-	vec2 window = rtgi_window(high);
-	c1 *= window.x;
-	c2 *= window.x;
-	c3 *= window.x;
-	c4 *= window.y;
-	c5 *= window.y;
-	c6 *= window.y;
-	c7 *= window.y;
-	c8 *= window.y;
+	c1 *= shares.x;
+	c2 *= shares.x;
+	c3 *= shares.x;
+	c4 *= shares.y;
+	c5 *= shares.y;
+	c6 *= shares.y;
+	c7 *= shares.y;
+	c8 *= shares.y;
 }
 
 // The nine coefficients of a probe, deringed, under `count` entries of three texels each: (column, light in r, g, b); what of that is

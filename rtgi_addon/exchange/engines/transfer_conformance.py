@@ -2,7 +2,7 @@
 
 Two sets: the ``kit``, whose tables are of every kind on the probes of `kit.py`, and the bundle's own. The tolerance is that of the
 probes (`conformance.py`), twice, since GPUs may cut where numpy rounds, and besides what rounding a table to half floats can
-change: 2^-11 of the sum of the magnitudes of what columns give. Where a probe rings, both may also change the window.
+change: 2^-11 of the sum of the magnitudes of what columns give. Where a probe rings, deringing follows what is rounded.
 """
 
 from dataclasses import replace
@@ -25,8 +25,8 @@ from .volumes import held_field
 
 SCHEMA = "rtgi-relight-conformance/1"
 _HALF = 2.0**-11
-# How far windows of ringing probes may follow what is rounded before them.
-_WINDOW = 1.0
+# How far a probe's coefficients follow what is rounded, deringing among it, as a share of that.
+_FOLLOWED = 1.0
 _SIDE = 4
 # What of a transfer is not by volume.
 _OF_ALL = "order", "sky_order", "sun_side", "sun_below", "lights", "sites", "world"
@@ -37,9 +37,6 @@ def kit_transfer() -> Transfer:
     """Tables of three lights, nine harmonics and twice 16 suns, for the probes of the kit."""
     grids, rng = [], np.random.default_rng(21)
     for grid in kit_field().grids():
-        if grid.volume.scattered is not None:
-            # Of its own, so that those of the lattices are not drawn anew with it.
-            rng = np.random.default_rng(23)
         shape = grid.sh.shape[:3]
         suns = 2 * _SIDE * _SIDE
 
@@ -129,7 +126,7 @@ def _rounding(held: ProbeField, transfer: Transfer, lighting: Lighting, sky: Sky
     lighting = replace(lighting, suns=None if lighting.suns is None else tuple(
         DistantSun(sun.towards, np.abs(sun.irradiance)) for sun in lighting.suns))
     by_name = {grid.volume.name: grid for grid in relit(absolute, lighting, sky)}
-    return ProbeField(tuple(replace(grid, sh=_WINDOW * _HALF * np.abs(by_name[grid.volume.name].sh[..., :9, :]))
+    return ProbeField(tuple(replace(grid, sh=_FOLLOWED * _HALF * np.abs(by_name[grid.volume.name].sh[..., :9, :]))
                             for grid in held.grids()), lookup=replace(held.lookup, reconstruction="linear"))
 
 

@@ -4,9 +4,10 @@ Every reconstruction takes radiance coefficients (…, k, c) and unit normals (�
 returns irradiance (…, c) [W·m⁻²]. ``linear`` is what a deringed probe is evaluated with; the two non-linear ones read the first
 four coefficients only and win where those are all there is.
 
-Sources: the window: P.-P. Sloan, "Deringing Spherical Harmonics", SIGGRAPH Asia 2017 Technical Briefs; the non-linear L1:
-Geomerics, "Reconstructing Diffuse Lighting from Spherical Harmonic Data", 2015; ZH3: T. Roughton et al., "ZH3: Quadratic Zonal
-Harmonics", Proc. ACM Comput. Graph. Interact. Tech. (I3D) 2024.
+Sources: deringing each probe as little as it needs: P.-P. Sloan, "Deringing Spherical Harmonics", SIGGRAPH Asia 2017 Technical
+Briefs, by a window of one strength, where we have two shares; the non-linear L1: Geomerics, "Reconstructing Diffuse Lighting from
+Spherical Harmonic Data", 2015; ZH3: T. Roughton et al., "ZH3: Quadratic Zonal Harmonics", Proc. ACM Comput. Graph. Interact.
+Tech. (I3D) 2024.
 """
 
 from functools import cache
@@ -22,16 +23,26 @@ RECONSTRUCTIONS = ("deringed", "linear", "geomerics", "zh3")
 # Directions in which every probe is searched for negative irradiance, and steps by which the lowest one found is refined: each
 # halves the distance, from a tenth of a radian to two thousandths of a degree.
 _DIRECTIONS, _REFINEMENTS = 1024, 12
+# So many times as many above order 2, whose minima lie closer together.
+_MORE = 4
 # Directions around the lowest one that a step of the refinement tries.
 _RING = 8
-# Probes that are windowed at once.
-_CHUNK = 256
+# Probes that are deringed at once.
+_CHUNK = 1024
 # The highest band that the compiled kernels know.
 _MOST_ORDER = 2
-# Strengths of the window that are tried, from harmless to flat: four a decade, then bisected so often, to a part in 10⁷.
-_WEAKEST, _STRONGEST, _RUNGS, _BISECTIONS = 1e-4, 1e4, 33, 24
-# How often the lowest direction of the windowed probe joins those that the window is chosen for.
+# Rays of shares are told apart to a part in a million, in engines as well; and steps to a least irradiance.
+_BISECTIONS, _NEWTON = 20, 8
+# What a band counts at least, as a share of all bands: one that is not there could be scaled by anything.
+_LEAST_POWER = 1e-6
+# How often the lowest direction of what is scaled joins those that shares are chosen for, where directions are sampled.
 _ROUNDS = 2
+# Bands up to here are quadratic in the direction: of band 1 the factor of (x, y, z), of band 2 the matrices of its five.
+_QUADRATIC_ORDER = 2
+_LINEAR = np.sqrt(3.0 / (4.0 * np.pi))
+_QUADRATIC = np.sqrt(15.0 / (16.0 * np.pi)) * np.array([
+    [[0, 1, 0], [1, 0, 0], [0, 0, 0]], [[0, 0, 0], [0, 0, 1], [0, 1, 0]], np.diag([-1, -1, 2]) / np.sqrt(3.0),
+    [[0, 0, 1], [0, 0, 0], [1, 0, 0]], np.diag([1, -1, 0])])
 # What bands above 0 are scaled down by, as a share of the mean, for rounding to float32.
 _ROUNDING = 1e-6
 # ZH3 (§3.4.3): the quadratic band's factors of the ratio and of its square, by the paper's fit.
@@ -87,19 +98,22 @@ def zh3(coefficients: np.ndarray, normals: np.ndarray) -> np.ndarray:
 
 
 def dering(coefficients: np.ndarray) -> np.ndarray:
-    """Window each probe of ``coefficients`` (…, k, c) by 1/(1 + λ·l²(l + 1)²) with the smallest λ that leaves no negative
-    irradiance in any direction or channel.
+    """Scale band 1 of each probe of ``coefficients`` (…, k, c), and all bands above it, by two shares of at most 1 that leave no
+    negative irradiance in any direction or channel, and change irradiance by the least that does (root mean square over all normals
+    and channels).
 
-    Probes that have none come back bit for bit; L0, and so the mean irradiance, is always kept. A channel whose L0 is not
-    positive has no such window and keeps only its L0.
+    Shares that leave none are a convex set, so that the one nearest to (1, 1) moves with the coefficients, and never jumps. Probes
+    that have no negative irradiance come back bit for bit; L0, and so the mean irradiance, is always kept. A channel whose L0 is
+    not positive has no such shares and keeps only its L0.
     """
     coefficients = np.asarray(coefficients)
     order = sh.order_of(coefficients.shape[-2])
     if order == 0:
         return coefficients
     flat = coefficients.reshape(-1, *coefficients.shape[-2:]).copy()
-    for start in range(0, len(flat), _CHUNK):
-        probes = flat[start:start + _CHUNK]
+    chunk = _CHUNK if order <= _QUADRATIC_ORDER else _CHUNK // _MORE
+    for start in range(0, len(flat), chunk):
+        probes = flat[start:start + chunk]
         lit = np.where(probes[:, :1] > 0.0, probes, 0.0)
         probes[:, 1:] = lit[:, 1:]
         doubtful = np.flatnonzero(np.any(_least_irradiance(lit, order) < 0.0, axis=1))
@@ -107,75 +121,112 @@ def dering(coefficients: np.ndarray) -> np.ndarray:
             continue
         ringing = doubtful[np.any(_lowest_irradiance(lit[doubtful], order)[0] < 0.0, axis=1)]
         if len(ringing):
-            probes[ringing, 1:] = _window(lit[ringing].astype(np.float64), order)[:, 1:]
+            probes[ringing, 1:] = _scaled(lit[ringing].astype(np.float64), order)[:, 1:]
     return flat.reshape(coefficients.shape)
 
 
-def _window(coefficients: np.ndarray, order: int) -> np.ndarray:
-    """The windowed ``coefficients`` (p, k, c) float64 of probes that all ring."""
-    band = sh.bands(order)
-    # Sampled directions find λ; the true minimum found between them joins the set of its own probe, and λ is found again.
-    extra = np.empty((len(coefficients), 0, 3))
-    for _ in range(_ROUNDS):
-        strength = _smallest_strength(_band_irradiance(coefficients, order, extra))
-        windowed = coefficients * _window_weights(strength, order)[:, band, None]
-        extra = np.concatenate([extra, _lowest_irradiance(windowed, order)[1]], axis=1)
-    strength = _smallest_strength(_band_irradiance(coefficients, order, extra))
-    windowed = coefficients * _window_weights(strength, order)[:, band, None]
-    # What bisection and refinement leave (about 1e-6 of the mean) goes by an exact scale of the bands above 0, which also
-    # covers the rounding to float32.
-    residue = np.maximum(-_lowest_irradiance(windowed, order)[0], 0.0)
-    mean = np.maximum(_mean_irradiance(windowed[:, 0]), np.finfo(np.float64).tiny)
-    windowed[:, 1:] *= (mean / (mean + residue + _ROUNDING * mean))[:, None]
-    return windowed
+def _scaled(coefficients: np.ndarray, order: int) -> np.ndarray:
+    """``coefficients`` (p, k, c) float64 of probes that all ring, scaled by their shares."""
+    convolved, band = coefficients * sh.cosine_coefficients(order)[:, None], sh.bands(order)
+    mean = _mean_irradiance(coefficients[:, 0])
+    if order <= _QUADRATIC_ORDER:
+        shares = _nearest_shares(mean, convolved, band, _quadratic_lowest(convolved))
+    else:
+        # Sampled directions find shares; the true minimum that they leave joins the set of its own probe, and they are found again.
+        extra = np.empty((len(coefficients), 0, 3))
+        for _ in range(_ROUNDS):
+            shares = _nearest_shares(mean, convolved, band, _sampled_lowest(convolved, order, extra))
+            found = _lowest_irradiance(coefficients * _by_band(shares, band)[..., None], order)[1]
+            extra = np.concatenate([extra, found], axis=1)
+    scaled = coefficients * _by_band(shares, band)[..., None]
+    # What bisection leaves goes by an exact scale of the bands above 0, which also covers the rounding to float32.
+    residue = np.maximum(-_lowest_irradiance(scaled, order)[0], 0.0)
+    mean = np.maximum(mean, np.finfo(np.float64).tiny)
+    scaled[:, 1:] *= (mean / (mean + residue + _ROUNDING * mean)).min(axis=1)[:, None, None]
+    return scaled
 
 
-def _smallest_strength(irradiance_bands: np.ndarray) -> np.ndarray:
-    """Smallest λ (p,) for which Σ_l w_l(λ)·E_l ≥ 0 at every sample; ``irradiance_bands`` (p, samples, L + 1)."""
-    order = irradiance_bands.shape[-1] - 1
-    ladder = np.geomspace(_WEAKEST, _STRONGEST, _RUNGS)
-    if kernels.is_available() and order <= _MOST_ORDER:
-        strength = np.empty(len(irradiance_bands))
-        kernels.call("window_strength", *irradiance_bands.shape, np.array(irradiance_bands), _RUNGS, ladder, _BISECTIONS, strength)
-        return strength
+def _by_band(shares: np.ndarray, band: np.ndarray) -> np.ndarray:
+    """(p, k): the factor of each coefficient."""
+    return np.concatenate([np.ones((len(shares), 1)), shares], axis=1)[:, np.minimum(band, 2)]
 
-    def rings(strength):
-        return np.any(irradiance_bands @ _window_weights(strength, order)[..., None] < 0.0, axis=(1, 2))
 
-    # The feasible λ need not form one interval: walk up a ladder and bisect the first step that ends without ringing.
-    low, high = np.zeros(len(irradiance_bands)), np.full(len(irradiance_bands), np.inf)
-    for rung in ladder:
-        still = np.isinf(high)
-        if not still.any():
+def _nearest_shares(mean: np.ndarray, convolved: np.ndarray, band: np.ndarray, lowest) -> np.ndarray:
+    """Shares (p, 2) in [0, 1]² of band 1 and of the bands above it, for probes of ``mean`` irradiance (p, c): of those that leave
+    none negative the nearest to (1, 1), a band counting by its square. ``lowest`` gives for shares (p,) and (p,) the least that
+    these make of the bands (p, c), and what band 1 is there (p, c).
+
+    Along a ray from (0, 0), on which the least falls in proportion, shares serve up to one place. So a bisection over rays is all
+    that it takes: on either side of the nearest place the way along the border towards it is known from the direction in which
+    irradiance is 0.
+    """
+    power = np.stack([np.sum(convolved[:, band == 1] ** 2, axis=(1, 2)), np.sum(convolved[:, band > 1] ** 2, axis=(1, 2))])
+    power = power + _LEAST_POWER * power.sum(axis=0)
+    low, high = np.zeros(len(mean)), np.ones(len(mean))
+    for step in range(_BISECTIONS + 1):
+        turn = 0.5 * (low + high)
+        ray = np.stack([1.0 - turn, turn])
+        least, first = lowest(*ray)
+        reach = np.where(least < 0.0, mean / np.maximum(-least, np.finfo(np.float64).tiny), np.inf)
+        channel = np.argmin(reach, axis=1)[:, None]
+        reach, least, first = (np.take_along_axis(values, channel, axis=1)[:, 0] for values in (reach, least, first))
+        nearest = np.sum(power * ray, axis=0) / np.sum(power * ray**2, axis=0)
+        edge = 1.0 / np.maximum(ray[0], ray[1])
+        length = np.minimum(np.minimum(reach, nearest), edge)
+        shares = length * ray
+        if step == _BISECTIONS:
             break
-        bad = rings(np.full(len(high), rung))
-        low = np.where(still & bad, rung, low)
-        high = np.where(still & ~bad, rung, high)
-    high = np.where(np.isinf(high), _STRONGEST, high)
-    for _ in range(_BISECTIONS):
-        middle = 0.5 * (low + high)
-        bad = rings(middle)
-        low, high = np.where(bad, middle, low), np.where(bad, high, middle)
-    return high
+        # How irradiance grows with the shares at the border: where it is 0, at the square's sides, or on the way to them.
+        grows = np.stack([first / np.maximum(ray[0], 1e-30), (least - first) / np.maximum(ray[1], 1e-30)])
+        side = np.where(turn < 0.5, np.array([[-1.0], [0.0]]), np.array([[0.0], [-1.0]]))
+        grows = np.where(length < reach, np.where(length < edge, -ray, side), grows)
+        left = power * (1.0 - shares)
+        up = left[0] * grows[1] > left[1] * grows[0]
+        low, high = np.where(up, turn, low), np.where(up, high, turn)
+    return shares.T
 
 
-def _window_weights(strength: np.ndarray, order: int) -> np.ndarray:
-    l = np.arange(order + 1)
-    return 1.0 / (1.0 + strength[:, None] * (l * (l + 1)) ** 2)
+def _quadratic_lowest(convolved: np.ndarray):
+    """``lowest`` of ``_nearest_shares`` for bands up to 2, exactly: the least of linear·n + nᵀ·M·n over unit vectors n by the dual
+    of this problem, which has no gap, in the axes of M, and Newton's steps after J. Moré and D. Sorensen, "Computing a Trust
+    Region Step", SIAM J. Sci. Stat. Comput. 4, 1983."""
+    linear = np.moveaxis(convolved[:, [3, 1, 2]], 1, 2) * _LINEAR
+    if convolved.shape[1] > 4:
+        values, axes = np.linalg.eigh(np.einsum("pkc,kij->pcij", convolved[:, 4:9], _QUADRATIC))
+        linear = np.einsum("pci,pcij->pcj", linear, axes)
+    else:
+        values = np.zeros_like(linear)
+
+    def lowest(first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        line, bend = 0.5 * first[:, None, None] * linear, second[:, None, None] * values
+        low = np.max(np.abs(line) - bend, axis=2)
+        shift = low
+        for _ in range(_NEWTON):
+            gap = np.maximum(bend + shift[..., None], 1e-30)
+            part = line / gap
+            square, slope = np.sum(part**2, axis=2), np.sum(part**2 / gap, axis=2)
+            step = np.divide((np.sqrt(square) - 1.0) * square, slope, out=np.zeros_like(square), where=slope > 0.0)
+            shift = np.maximum(low, shift + step)
+        half = np.sum(line**2 / np.maximum(bend + shift[..., None], 1e-30), axis=2)
+        return -shift - half, -2.0 * half
+
+    return lowest
 
 
-def _band_irradiance(coefficients: np.ndarray, order: int, extra: np.ndarray) -> np.ndarray:
-    """Each band's irradiance (p, samples, L + 1) at the common directions and each probe's own ``extra`` (p, m, 3), all
-    channels that have light one after the other."""
-    band, convolved = sh.bands(order), coefficients * sh.cosine_coefficients(order)[:, None]
-    shared, by_probe = sh.evaluate(_directions().astype(np.float64), order), sh.evaluate(extra, order)
-    of_bands = []
-    for l in range(order + 1):
-        chosen = band == l
-        everywhere = [basis[..., chosen] @ convolved[:, chosen] for basis in (shared, by_probe)]
-        of_bands.append(np.concatenate(everywhere, axis=1))
-    stacked = np.stack(of_bands, axis=-1)
-    return stacked.reshape(len(coefficients), -1, order + 1)
+def _sampled_lowest(convolved: np.ndarray, order: int, extra: np.ndarray):
+    """``lowest`` of ``_nearest_shares`` for any bands, at the common directions and each probe's own ``extra`` (p, m, 3)."""
+    band = sh.bands(order)
+    shared, by_probe = sh.evaluate(_directions(order).astype(np.float64), order), sh.evaluate(extra, order)
+    of_first, of_rest = (np.concatenate([shared[:, chosen] @ convolved[:, chosen], by_probe[..., chosen] @ convolved[:, chosen]],
+                                        axis=1) for chosen in (band == 1, band > 1))
+
+    def lowest(first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        of_one = first[:, None, None] * of_first
+        total = of_one + second[:, None, None] * of_rest
+        where = np.argmin(total, axis=1)[:, None]
+        return np.take_along_axis(total, where, axis=1)[:, 0], np.take_along_axis(of_one, where, axis=1)[:, 0]
+
+    return lowest
 
 
 def _least_irradiance(coefficients: np.ndarray, order: int) -> np.ndarray:
@@ -194,18 +245,19 @@ def _lowest_irradiance(coefficients: np.ndarray, order: int) -> tuple[np.ndarray
     """
     convolved = coefficients * sh.cosine_coefficients(order)[:, None]
     angle = 2.0 * np.pi * np.arange(_RING) / _RING
-    step = np.sqrt(4.0 * np.pi / _DIRECTIONS)
+    common = _directions(order)
+    step = np.sqrt(4.0 * np.pi / len(common))
     if kernels.is_available() and order <= _MOST_ORDER:
         count, channels = len(coefficients), coefficients.shape[2]
         values, directions = np.empty((count, channels)), np.empty((count, channels, 3))
-        common = _directions().astype(np.float64)
+        common = common.astype(np.float64)
         kernels.call("lowest_irradiance", count, order, channels, np.array(convolved, np.float64), len(common), common,
                      np.ascontiguousarray(sh.evaluate(common, order)), step, _REFINEMENTS, _RING,
                      np.stack([np.cos(angle), np.sin(angle)], axis=1), values, directions)
         return values, directions
-    sampled = sh.evaluate(_directions(), order) @ convolved
+    sampled = sh.evaluate(common, order) @ convolved
     best = np.argmin(sampled, axis=1)
-    directions = _directions()[best].astype(np.float64)
+    directions = common[best].astype(np.float64)
     values = np.take_along_axis(sampled, best[:, None], axis=1)[:, 0]
     # A spherical polynomial of degree L bends by at most L² times its range, so only these can dip below 0 between samples.
     margin = 0.5 * (step * order) ** 2 * (np.max(sampled, axis=1) - values)
@@ -229,8 +281,8 @@ def _lowest_irradiance(coefficients: np.ndarray, order: int) -> tuple[np.ndarray
 
 
 @cache
-def _directions() -> np.ndarray:
-    return sampling.fibonacci_sphere(_DIRECTIONS)
+def _directions(order: int) -> np.ndarray:
+    return sampling.fibonacci_sphere(_DIRECTIONS * (_MORE if order > _QUADRATIC_ORDER else 1))
 
 
 def _l1_per_channel(coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -183,7 +183,7 @@ static func _harmonics(n: Vector3) -> PackedFloat64Array:
 	]
 
 
-## From here on the functions of relight.gdshader, which says what they are: windows the 27 numbers from [param first] on.
+## From here on the functions of relight.gdshader, which says what they are: derings the 27 numbers from [param first] on.
 static func dering(c: PackedFloat64Array, first: int) -> void:
 	var means: PackedFloat64Array = []
 	var linear: PackedFloat64Array = []
@@ -209,34 +209,54 @@ static func dering(c: PackedFloat64Array, first: int) -> void:
 	for channel in 3:
 		if c[first + channel] > 0.0:
 			_axes(c, first + channel, linear, values)
-	if not _rings(0.0, means, linear, values):
+	if _border(1.0, 1.0, means, linear, values)[0] >= 1.0:
 		return
+	var one := 0.0
+	var two := 0.0
+	for value in range(3, 12):
+		one += 4.0 / 9.0 * c[first + value] ** 2
+	for value in range(12, 27):
+		two += 1.0 / 16.0 * c[first + value] ** 2
+	var some := 1e-6 * (one + two)
+	one += some
+	two += some
 	var low := 0.0
-	var high := 1e4
-	for rung in 33:
-		var strength := pow(10.0, 0.25 * rung - 4.0)
-		if not _rings(strength, means, linear, values):
-			high = strength
-			break
-		low = strength
-	for bisection in 16:
-		var middle := 0.5 * (low + high)
-		if _rings(middle, means, linear, values):
-			low = middle
+	var high := 1.0
+	var share_one := 0.0
+	var share_two := 0.0
+	for bisection in 21:
+		var turn := 0.5 * (low + high)
+		var border := _border(1.0 - turn, turn, means, linear, values)
+		var nearest := (one * (1.0 - turn) + two * turn) / (one * (1.0 - turn) ** 2 + two * turn ** 2)
+		var edge := 1.0 / maxf(1.0 - turn, turn)
+		var reach := minf(minf(border[0], nearest), edge)
+		share_one = reach * (1.0 - turn)
+		share_two = reach * turn
+		var grows_one := border[1] / maxf(1.0 - turn, 1e-30)
+		var grows_two := border[2] / maxf(turn, 1e-30)
+		if reach < border[0]:
+			grows_one = turn - 1.0 if reach < edge else (-1.0 if turn < 0.5 else 0.0)
+			grows_two = -turn if reach < edge else (0.0 if turn < 0.5 else -1.0)
+		if one * (1.0 - share_one) * grows_two > two * (1.0 - share_two) * grows_one:
+			low = turn
 		else:
-			high = middle
+			high = turn
 	for value in range(3, 27):
-		c[first + value] *= 1.0 / (1.0 + (4.0 if value < 12 else 36.0) * high)
+		c[first + value] *= share_one if value < 12 else share_two
 
 
-static func _rings(strength: float, means: PackedFloat64Array, linear: PackedFloat64Array, values: PackedFloat64Array) -> bool:
+static func _border(one: float, two: float, means: PackedFloat64Array, linear: PackedFloat64Array,
+		values: PackedFloat64Array) -> PackedFloat64Array:
+	var result: PackedFloat64Array = [1e30, 0.0, 0.0]
 	for colour in means.size():
-		if means[colour] + _least(linear, values, 3 * colour, 1.0 / (1.0 + 4.0 * strength), 1.0 / (1.0 + 36.0 * strength)) < 0.0:
-			return true
-	return false
+		var least := _least(linear, values, 3 * colour, one, two)
+		var reach := means[colour] / -least.y if least.y < 0.0 else 1e30
+		if reach < result[0]:
+			result = [reach, least.x, least.y - least.x]
+	return result
 
 
-static func _least(linear: PackedFloat64Array, values: PackedFloat64Array, at: int, one: float, two: float) -> float:
+static func _least(linear: PackedFloat64Array, values: PackedFloat64Array, at: int, one: float, two: float) -> Vector2:
 	var l0 := one * linear[at]
 	var l1 := one * linear[at + 1]
 	var l2 := one * linear[at + 2]
@@ -245,7 +265,7 @@ static func _least(linear: PackedFloat64Array, values: PackedFloat64Array, at: i
 	var v2 := two * values[at + 2]
 	var low := maxf(0.5 * absf(l0) - v0, maxf(0.5 * absf(l1) - v1, 0.5 * absf(l2) - v2))
 	var shift := low
-	for step in 8:
+	for step in 9:
 		var g0 := maxf(v0 + shift, 1e-30)
 		var g1 := maxf(v1 + shift, 1e-30)
 		var g2 := maxf(v2 + shift, 1e-30)
@@ -254,10 +274,11 @@ static func _least(linear: PackedFloat64Array, values: PackedFloat64Array, at: i
 		var p2 := 0.5 * l2 / g2
 		var square := p0 * p0 + p1 * p1 + p2 * p2
 		var slope := p0 * p0 / g0 + p1 * p1 / g1 + p2 * p2 / g2
-		if slope <= 0.0 or step == 7:
-			return -shift - 0.5 * (l0 * p0 + l1 * p1 + l2 * p2)
+		if slope <= 0.0 or step == 8:
+			var first := -(l0 * p0 + l1 * p1 + l2 * p2)
+			return Vector2(first, 0.5 * first - shift)
 		shift = maxf(low, shift + (sqrt(square) - 1.0) * square / slope)
-	return 0.0
+	return Vector2.ZERO
 
 
 static func _axes(c: PackedFloat64Array, at: int, linear: PackedFloat64Array, values: PackedFloat64Array) -> void:

@@ -460,34 +460,46 @@ function dering(c) {
     return;
   }
   const shapes = colours.map(([mean, of]) => ({ mean, ...axes(of) }));
-  const rings = (strength) => {
-    const [first, second] = windows(strength);
-    return shapes.some(({ mean, linear, values }) =>
-      mean + least(linear.map((value) => first * value), values.map((value) => second * value)) < 0);
-  };
-  if (!rings(0)) {
+  if (border([1, 1], shapes)[0] >= 1) {
     return;
   }
-  let low = 0, high = 1e4;
-  for (let rung = 0; rung < 33; rung++) {
-    const strength = 10 ** (0.25 * rung - 4);
-    if (!rings(strength)) {
-      high = strength;
-      break;
-    }
-    low = strength;
-  }
-  for (let bisection = 0; bisection < 16; bisection++) {
-    const middle = 0.5 * (low + high);
-    [low, high] = rings(middle) ? [middle, high] : [low, middle];
-  }
-  const [first, second] = windows(high);
+  const power = [0, 0];
   for (let i = 3; i < 27; i++) {
-    c[i] *= i < 12 ? first : second;
+    power[i < 12 ? 0 : 1] += (i < 12 ? 4 / 9 : 1 / 16) * c[i] * c[i];
+  }
+  const some = 1e-6 * (power[0] + power[1]);
+  power[0] += some;
+  power[1] += some;
+  let low = 0, high = 1, shares = [0, 0];
+  for (let bisection = 0; bisection < 21; bisection++) {
+    const turn = 0.5 * (low + high), ray = [1 - turn, turn];
+    const [served, first, second] = border(ray, shapes);
+    const nearest = (power[0] * ray[0] + power[1] * ray[1]) / (power[0] * ray[0] * ray[0] + power[1] * ray[1] * ray[1]);
+    const edge = 1 / Math.max(...ray), reach = Math.min(served, nearest, edge);
+    shares = [reach * ray[0], reach * ray[1]];
+    let grows = [first / Math.max(ray[0], 1e-30), second / Math.max(ray[1], 1e-30)];
+    if (reach < served) {
+      grows = reach < edge ? [-ray[0], -ray[1]] : turn < 0.5 ? [-1, 0] : [0, -1];
+    }
+    const up = power[0] * (1 - shares[0]) * grows[1] > power[1] * (1 - shares[1]) * grows[0];
+    [low, high] = up ? [turn, high] : [low, turn];
+  }
+  for (let i = 3; i < 27; i++) {
+    c[i] *= shares[i < 12 ? 0 : 1];
   }
 }
 
-const windows = (strength) => [1 / (1 + 4 * strength), 1 / (1 + 36 * strength)];
+function border(ray, shapes) {
+  let result = [1e30, 0, 0];
+  for (const { mean, linear, values } of shapes) {
+    const [first, all] = least(linear.map((value) => ray[0] * value), values.map((value) => ray[1] * value));
+    const reach = all < 0 ? mean / -all : 1e30;
+    if (reach < result[0]) {
+      result = [reach, first, all - first];
+    }
+  }
+  return result;
+}
 
 function axes(of) {
   const zonal = COSINE_2_ZONAL * of(6), across = 0.5 * COSINE_2 * of(8), half = 0.5 * COSINE_2;
@@ -516,7 +528,7 @@ function least(linear, values) {
   const low = Math.max(...linear.map((value, i) => 0.5 * Math.abs(value) - values[i]));
   const part = (shift, i) => 0.5 * linear[i] / Math.max(values[i] + shift, 1e-30);
   let shift = low;
-  for (let step = 0; step < 7; step++) {
+  for (let step = 0; step < 8; step++) {
     let square = 0, slope = 0;
     for (let i = 0; i < 3; i++) {
       const p = part(shift, i) ** 2;
@@ -527,5 +539,6 @@ function least(linear, values) {
       shift = Math.max(low, shift + (Math.sqrt(square) - 1) * square / slope);
     }
   }
-  return -shift - 0.5 * (linear[0] * part(shift, 0) + linear[1] * part(shift, 1) + linear[2] * part(shift, 2));
+  const first = -(linear[0] * part(shift, 0) + linear[1] * part(shift, 1) + linear[2] * part(shift, 2));
+  return [first, 0.5 * first - shift];
 }
