@@ -86,9 +86,13 @@ class Chart:
         front = pareto_front([self.points[row].cost(cost) for row in rows], [self.points[row].error(place) for row in rows])
         return [rows[index] for index in front]
 
-    def techniques(self) -> list[str]:
-        """Names of the techniques that were measured, in order."""
-        return list(dict.fromkeys(point.technique for point in self.points))
+    def measured(self, place: str) -> list[Point]:
+        """The points that were measured in ``place``."""
+        return [point for point in self.points if place in point.accuracy]
+
+    def techniques(self, place: str | None = None) -> list[str]:
+        """Names of what was measured (in ``place``), in order: techniques, and the light atlas, which is in its place alone."""
+        return list(dict.fromkeys(point.technique for point in (self.points if place is None else self.measured(place))))
 
     def to_json(self) -> dict:
         """Everything, as plain values once infinities are dealt with (exchange.plain)."""

@@ -56,9 +56,11 @@ def draw_chart(chart: Chart, folder: Path) -> tuple[Path, Path]:
              "text.color": INK, "axes.labelcolor": INK, "xtick.color": INK, "ytick.color": INK, "svg.fonttype": "none",
              "svg.hashsalt": "rtgi", "xtick.major.width": 0.7, "ytick.major.width": 0.7}
     with mpl.rc_context(style):
-        figure = Figure(figsize=(11.5, 6.3), layout="constrained")
+        # One more column where there is a light atlas.
+        wide = bool(chart.measured("atlas"))
+        figure = Figure(figsize=(14.4 if wide else 11.5, 6.3), layout="constrained")
         FigureCanvasAgg(figure)
-        grid = figure.add_gridspec(2, 4)
+        grid = figure.add_gridspec(2, 5 if wide else 4)
         main = figure.add_subplot(grid[:, :2])
         _draw_panel(main, chart, "seconds", "surface")
         main.set_title("Light on surfaces against time", loc="left", fontweight="bold")
@@ -69,6 +71,10 @@ def draw_chart(chart: Chart, folder: Path) -> tuple[Path, Path]:
             axis = figure.add_subplot(cell)
             _draw_panel(axis, chart, cost, place, small=True)
             axis.set_title(title, loc="left", fontweight="bold", fontsize=FONT)
+        if wide:
+            axis = figure.add_subplot(grid[:, 4])
+            _draw_panel(axis, chart, "seconds", "atlas", small=True)
+            axis.set_title("Surfaces in the light atlas", loc="left", fontweight="bold", fontsize=FONT)
         figure.suptitle(_title(chart), x=0.008, ha="left", fontsize=FONT)
         handles = _legend_entries(chart)
         figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False, fontsize=FONT - 0.5,
@@ -198,7 +204,8 @@ def _place_labels(axis, chart: Chart) -> None:
     """Label every point of the main panel, front and defaults first."""
     front = set(chart.front())
     place_labels(axis, [(point.seconds.mean, _shown_error(point, "surface"), point.label, _look(chart, point.technique)[0],
-                         (index not in front, not point.default)) for index, point in enumerate(chart.points)])
+                         (index not in front, not point.default))
+                        for index, point in enumerate(chart.points) if "surface" in point.accuracy])
 
 
 def place_labels(axis, entries: list[tuple]) -> None:

@@ -28,6 +28,16 @@ def markdown(chart: Chart, pictures: tuple[str, ...] = ()) -> str:
         f"confidence intervals. Times are wall clock on {chart.machine['cores']} cores"
         + (f" with {chart.threads} threads" if chart.threads else "") + ".",
         *(f"![{name}]({name})" for name in pictures),
+        *_techniques(chart), *_known(chart), *_leaks(chart), *_atlas(chart), *_effects(chart),
+        *left_out,
+    ]
+    return "\n\n".join(parts).replace("\n\n- ", "\n- ") + "\n"
+
+
+def _techniques(chart: Chart) -> list[str]:
+    if not chart.measured("surface"):
+        return []
+    return [
         "## Every setting", _settings_table(chart),
         "*Surface*: the technique's own light at all receivers; *own normals*: of these, only on surfaces under their own normal; "
         "*shipped*: all receivers lit by the baked probes, as in an engine; *probes*: SH at the probes, nothing interpolated; "
@@ -35,11 +45,7 @@ def markdown(chart: Chart, pictures: tuple[str, ...] = ()) -> str:
         "the bake's peak above what was held before. *Look-up*: one surface point of the technique's own field, on the CPU.",
         "## At equal time", "The least surface error that a technique reaches within the time; only measured settings, nothing "
         "interpolated.", _equal_time(chart),
-        "## At equal error", "The least time in which a technique reaches the error.", _equal_error(chart),
-        *_known(chart), *_leaks(chart), *_effects(chart),
-        *left_out,
-    ]
-    return "\n\n".join(parts).replace("\n\n- ", "\n- ") + "\n"
+        "## At equal error", "The least time in which a technique reaches the error.", _equal_error(chart)]
 
 
 def summary(chart: Chart) -> str:
@@ -47,10 +53,12 @@ def summary(chart: Chart) -> str:
     if not chart.points:
         return ""
     lines = []
-    for index in chart.front():
-        point = chart.points[index]
-        lines.append(f"  {_seconds(point.seconds.mean):>8}  {_percent(point.error()):>7}  {point.technique}, {point.label}")
-    return "\n".join(["  time      error    the least time for this error", *lines])
+    for place, where in (("surface", ""), ("atlas", ", on surfaces in the light atlas")):
+        front = [chart.points[index] for index in chart.front("seconds", place)]
+        lines += [f"  time      error    the least time for this error{where}"] if front else []
+        lines += [f"  {_seconds(point.seconds.mean):>8}  {_percent(point.error(place)):>7}  {point.technique}, {point.label}"
+                  for point in front]
+    return "\n".join(lines)
 
 
 def picture_summary(chart: Chart) -> str:
@@ -91,6 +99,8 @@ def _settings_table(chart: Chart) -> str:
     front = set(chart.front())
     rows = []
     for index, point in enumerate(chart.points):
+        if "surface" not in point.accuracy:
+            continue
         surface = point.accuracy["surface"]
         rows.append([
             point.technique, point.label + (" ◆" if index in front else ""), _range(point.seconds, _seconds),
@@ -105,7 +115,7 @@ def _settings_table(chart: Chart) -> str:
 
 
 def _equal_time(chart: Chart) -> str:
-    times = [point.seconds.mean for point in chart.points]
+    times = [point.seconds.mean for point in chart.measured("surface")]
     steps = _thinned(round_steps(min(times), max(times)))
 
     def cell(points: list[Point], budget: float) -> str:
@@ -116,7 +126,7 @@ def _equal_time(chart: Chart) -> str:
 
 
 def _equal_error(chart: Chart) -> str:
-    errors = [max(point.error(), 1e-4) for point in chart.points]
+    errors = [max(point.error(), 1e-4) for point in chart.measured("surface")]
     steps = _thinned(round_steps(min(errors), max(errors), ERROR_STEPS))
 
     def cell(points: list[Point], target: float) -> str:
@@ -127,7 +137,7 @@ def _equal_error(chart: Chart) -> str:
 
 
 def _by_technique(chart: Chart, head: str, steps, cell) -> str:
-    names = chart.techniques()
+    names = chart.techniques("surface")
     groups = {name: [point for point in chart.points if point.technique == name] for name in names}
     return _table([head, *names], [[text, *(cell(groups[name], step) for name in names)] for step, text in steps], 1)
 
@@ -144,13 +154,29 @@ def _known(chart: Chart) -> list[str]:
 
 def _leaks(chart: Chart) -> list[str]:
     rows = [[point.technique, point.label, f"{surface.leak:.2g}", f"{shipped.leak:.2g}", f"{surface.true_leak:.2g}"]
-            for point in chart.points
+            for point in chart.measured("surface")
             if (surface := point.accuracy["surface"]).leak is not None and (shipped := point.accuracy["shipped"]).leak is not None]
     if not rows:
         return []
     return ["## Leaks",
             f"Mean irradiance of the {chart.receivers['dark']} dark receivers (less than a hundredth of the mean) relative to "
             "that of the others.", _table(["technique", "setting", "surface", "shipped", "exact"], rows, 2)]
+
+
+def _atlas(chart: Chart) -> list[str]:
+    points = chart.measured("atlas")
+    if not points:
+        return []
+    front, rows = [chart.points[index] for index in chart.front("seconds", "atlas")], []
+    for point in points:
+        found, best = point.accuracy["atlas"], any(point is other for other in front)
+        rows.append([point.technique, point.label + " ◆" * best, _range(point.seconds, _seconds),
+                     _seconds(point.cpu_seconds.mean), f"{point.field_bytes / MEBIBYTE:.2f}", _range(found.spread.error, _percent),
+                     _signed(found.bias)])
+    return ["## Light atlas",
+            f"At the {chart.receivers['atlas']} of these points that lie on surfaces in the light atlas, under their own normals: "
+            "the atlas at several densities, and there each technique's own light.",
+            _table(["", "setting (◆ on the Pareto front)", "time", "CPU time", "size [MiB]", "error", "bias"], rows, 2)]
 
 
 def _table(heads: list[str], rows: list[list[str]], text_columns: int) -> str:

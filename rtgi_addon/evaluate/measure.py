@@ -9,7 +9,8 @@ Each bake is held to the reference in several places, which separates the causes
 - ``own_normals``: of these only the receivers under the surface's own normal;
 - ``shipped``: the same receivers lit by the probes that the bundle holds, as an engine would be;
 - ``probes``: the SH of usable probes, where nothing is interpolated;
-- ``known``: ``surface`` against only that light which the technique knows (``Technique.knows``).
+- ``known``: ``surface`` against only that light which the technique knows (``Technique.knows``);
+- ``atlas``: of ``own_normals`` those on surfaces that are in the light atlas, where there is one (`atlas.py`).
 """
 
 from dataclasses import dataclass, field, replace
@@ -28,6 +29,7 @@ from ..techniques.lattice.field import ProbeField
 from ..techniques.lattice.focus import probes_of, spacing_of
 from ..techniques.lattice.placement import place
 from ..transport.context import LightContext
+from .atlas import ATLAS_SWEEP, AtlasSweep, bake_and_read, on_atlas
 from .costs import Costs, metered
 from .metrics import energy_ratio, leak_ratio, relative_rmse, relmse
 from .receivers import Receivers, open_probes, surface_receivers
@@ -43,7 +45,7 @@ PROBE_ORDER = 2
 _BAKED = 0.9
 # Tells the choice of probes apart from all other numbers of a seed: the letters pr.
 _STREAM = 0x7072
-PLACES = ("surface", "own_normals", "shipped", "probes", "known")
+PLACES = ("surface", "own_normals", "shipped", "probes", "known", "atlas")
 
 
 @dataclass(frozen=True)
@@ -125,6 +127,7 @@ class Yard:
         self.probe_points = lattice[self.probe_rows].astype(np.float32)
         self.path_reference = PathReference(self.context, noise)
         self.reference = reference or self.path_reference
+        self.on_atlas = on_atlas(self.context, self.receivers)
         self._truths: dict[object, Truth] = {}
         self._keep = keep
 
@@ -156,11 +159,13 @@ class Yard:
         brightness = self.truth.mean.sum(axis=1)
         return brightness < DARK * brightness.mean()
 
-    def measure(self, technique: Technique, settings, seed: int, progress: Progress | None = None, *, lattice: float = 1.0,
-                **options) -> Run:
+    def measure(self, technique: Technique | AtlasSweep, settings, seed: int, progress: Progress | None = None, *,
+                lattice: float = 1.0, **options) -> Run:
         """Bake with ``technique`` and compare. ``lattice`` multiplies the volumes' resolution; there are no errors at ``probes``
         where that is not 1, since others are baked. ``options`` go to the technique's ``bake``. Raises BakeError, Cancelled."""
         progress = progress or Progress()
+        if technique is ATLAS_SWEEP:
+            return self._measured_atlas(settings, seed, progress)
         scene = self.scene if lattice == 1.0 else replace(self.scene, volumes=tuple(
             replace(volume, resolution=scaled_resolution(volume.resolution, lattice)) for volume in self.scene.volumes))
         with metered() as costs:
@@ -174,6 +179,8 @@ class Yard:
         probes = ProbeField.of(baked)
         estimates = {"surface": surface, "own_normals": surface[self.receivers.own],
                      "shipped": probes.irradiance(self.receivers.points, self.receivers.normals)}
+        if self.on_atlas is not None:
+            estimates["atlas"] = surface[self.on_atlas.rows]
         if lattice == 1.0:
             estimates["probes"] = np.concatenate([grid.sh.reshape(-1, *grid.sh.shape[3:]) for grid in grids])[self.probe_rows]
         if technique.knows != KNOWN_LIGHT:
@@ -182,18 +189,29 @@ class Yard:
                   estimates, baked, lattice)
         return self.compared(run, technique)
 
-    def compared(self, run: Run, technique: Technique) -> Run:
+    def _measured_atlas(self, settings, seed: int, progress: Progress) -> Run:
+        costs, lookup, held, light = bake_and_read(self.scene, self.context, self.receivers, self.on_atlas, settings, seed,
+                                                   self.threads, progress)
+        return self.compared(Run(ATLAS_SWEEP.name, settings, seed, costs, lookup, held, {}, {"atlas": light}), ATLAS_SWEEP)
+
+    def compared(self, run: Run, technique: Technique | AtlasSweep) -> Run:
         """``run`` of ``technique`` with its errors, from its estimates."""
         return replace(run, errors={place: self._errors(place, estimate, technique) for place, estimate in run.estimates.items()})
 
-    def truth_for(self, place: str, estimate: np.ndarray, technique: Technique) -> Truth:
+    def truth_for(self, place: str, estimate: np.ndarray, technique: Technique | AtlasSweep) -> Truth:
         """The reference that ``estimate`` in ``place`` (of PLACES) is held to, of its shape."""
         if place == "probes":
             count = min(estimate.shape[1], sh.coefficient_count(PROBE_ORDER))
             return Truth(*(values[:, :count] for values in self.probe_truth))
         if place == "known":
             return self._truth(technique.knows)
-        return Truth(*(values[self.receivers.own] for values in self.truth)) if place == "own_normals" else self.truth
+        return Truth(*(self._at(place, values) for values in self.truth))
+
+    def _at(self, place: str, values: np.ndarray) -> np.ndarray:
+        """Those of ``values`` (n, …) at all receivers that belong to ``place``."""
+        if place == "atlas":
+            return values[self.on_atlas.rows]
+        return values[self.receivers.own] if place == "own_normals" else values
 
     def _errors(self, place: str, estimate: np.ndarray, technique: Technique) -> Errors:
         truth = self.truth_for(place, estimate, technique)
@@ -204,7 +222,7 @@ class Yard:
             least = estimate[:, 0]
         else:
             level, least = truth.mean, estimate
-            dark = self.dark[self.receivers.own] if place == "own_normals" else self.dark
+            dark = self._at(place, self.dark)
             if dark.any() and not dark.all():
                 leak, true_leak = leak_ratio(estimate, dark, ~dark), leak_ratio(truth.mean, dark, ~dark)
         energy, mean = energy_ratio(estimate, truth.mean).value, float(np.mean(level))

@@ -22,10 +22,14 @@ _MARGIN, _LEAST = 1.5, 1e-4
 
 def draw_plain_chart(chart: Chart, path: Path) -> Path:
     """Draw ``chart`` as the PNG ``path``. Raises BakeError for a disk that refuses."""
-    canvas = _Canvas([(point.technique, point.seconds.mean, point.error() or 0.0, point.default) for point in chart.points])
+    # With a light atlas all are held to where it is read, for it is nowhere else.
+    place = "atlas" if chart.measured("atlas") else "surface"
+    points = chart.measured(place)
+    canvas = _Canvas([(point.technique, point.seconds.mean, point.error(place), point.default) for point in points])
     canvas.axes("time of a bake")
-    canvas.front(chart.front())
-    return canvas.written(path, f"{chart.scene}: light on surfaces against time" + ("" if chart.complete else " (not complete)"),
+    canvas.front([points.index(chart.points[index]) for index in chart.front("seconds", place)])
+    where = "light on surfaces in the light atlas" if place == "atlas" else "light on surfaces"
+    return canvas.written(path, f"{chart.scene}: {where} against time" + ("" if chart.complete else " (not complete)"),
                           "filled: defaults; black line: beaten by nothing in both")
 
 

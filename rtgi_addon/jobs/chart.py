@@ -9,8 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from .. import techniques
+from ..discovery import named
 from ..errors import BakeError, Cancelled, UsageError
 from ..evaluate import chart_picture
+from ..evaluate.atlas import ATLAS_SWEEP, AtlasSweep, wants_atlas
 from ..evaluate.chart_data import SCHEMA, Chart, point_of
 from ..evaluate.chart_text import markdown, picture_summary, summary
 from ..evaluate.costs import Costs
@@ -82,7 +84,8 @@ def chart_scene(scene: Scene, out, names: list[str] | None = None, *, seeds: int
                 reference: Reference | None = None, pictures: PictureReference | None = None, effects: list[str] | None = None,
                 threads: int | None = None, resume: bool = False, progress: Progress | None = None,
                 on_point: Callable[[Chart], None] | None = None) -> ChartReport:
-    """Measure the techniques ``names`` (None: all) on ``scene`` and write chart.json, chart.md and the pictures into ``out``.
+    """Measure the techniques ``names`` (None: all) on ``scene`` and write chart.json, chart.md and the pictures into ``out``. Where
+    objects are in the light atlas, it is one of them ("atlas"), held to surfaces that are in it.
 
     Every setting of each technique's sweep is baked with ``seeds`` seeds and compared at ``points`` surface points under
     ``normals_per_point`` normals and at ``probes`` probes with ``reference`` (None: the path tracer, until its noise is ``noise``).
@@ -95,7 +98,11 @@ def chart_scene(scene: Scene, out, names: list[str] | None = None, *, seeds: int
     incomplete, unless a complete chart is there.
     """
     progress = progress or Progress()
-    methods = [techniques.get(name) for name in dict.fromkeys(techniques.names() if names is None else names)]
+    methods = known_techniques(names)
+    if ATLAS_SWEEP in methods and not wants_atlas(scene):
+        if names is not None:
+            raise BakeError("no object is in the light atlas", "name one (--atlas OBJECT), or put it there in its properties")
+        methods.remove(ATLAS_SWEEP)
     if not methods and pictures is None:
         raise UsageError("a chart without techniques and without pictures of effects has nothing to measure", "name a technique")
     known_effects(effects)
@@ -117,6 +124,9 @@ def chart_scene(scene: Scene, out, names: list[str] | None = None, *, seeds: int
         if methods:
             yard = Yard(scene, points=points, normals_per_point=normals_per_point, probes=probes, noise=noise, threads=threads,
                         reference=reference, keep=parts)
+            if yard.on_atlas is None and ATLAS_SWEEP in methods:
+                raise BakeError("no surface in the light atlas is seen from a probe",
+                                "put one there that is, or measure more points")
             progress.stage("references")
             yard.prepare([method.knows for method in methods], progress.span(0.0, REFERENCES_UNTIL))
         drawn = PictureSurvey(scene, effects, pictures, most_seconds, threads, parts)
@@ -140,6 +150,14 @@ def chart_scene(scene: Scene, out, names: list[str] | None = None, *, seeds: int
         parts.remove()
     progress.step(1.0, "Done")
     return report
+
+
+def known_techniques(names: list[str] | None) -> list[Technique | AtlasSweep]:
+    """The techniques called ``names`` (None: all) and the light atlas, by its name, each once. Raises UsageError for one that does
+    not exist."""
+    known = {**techniques.registry(), ATLAS_SWEEP.name: ATLAS_SWEEP}
+    every = [*techniques.names(), ATLAS_SWEEP.name]
+    return [named(known, name, "technique") for name in dict.fromkeys(every if names is None else names)]
 
 
 def check_chart(out, inputs=()) -> Path:
@@ -169,8 +187,8 @@ class _Survey:
     """The bakes of a chart. ``runs`` maps (technique, number in its sweep) to one run a seed; what ``parts`` has of an earlier run
     is not measured again. ``drawn`` has the pictures of effects."""
 
-    def __init__(self, scene: Scene, yard: Yard | None, methods: list[Technique], seeds: int, most_seconds: float, parts: Parts,
-                 drawn: PictureSurvey):
+    def __init__(self, scene: Scene, yard: Yard | None, methods: list[Technique | AtlasSweep], seeds: int, most_seconds: float,
+                 parts: Parts, drawn: PictureSurvey):
         self.scene, self.drawn = scene, drawn
         self.yard, self.methods, self.seeds, self.most_seconds, self._parts = yard, methods, seeds, most_seconds, parts
         self.runs: dict[tuple[str, int], list[Run]] = {}
@@ -206,7 +224,8 @@ class _Survey:
         return Chart(
             yard.scene.name,
             {"kind": yard.reference.kind, "noise": yard.truth.noise, "probe_noise": yard.probe_truth.noise},
-            {"points": count // normals, "normals": normals, "dark": int(yard.dark.sum()), "probes": len(yard.probe_rows),
+            {"points": count // normals, "normals": normals, "atlas": 0 if yard.on_atlas is None else len(yard.on_atlas.rows),
+             "dark": int(yard.dark.sum()), "probes": len(yard.probe_rows),
              "probes_in_all": int(sum(np.prod(volume.resolution) for volume in yard.scene.volumes))},
             yard.floor, self.seeds, yard.threads, _machine(), points, left_out, complete, self.drawn.chart)
 
@@ -230,7 +249,8 @@ class _Survey:
             self.left_out.append(f"{name}, setting {number + 1}: a cheaper one took more than {self.most_seconds:g} s")
         return not dear
 
-    def _measure(self, key: tuple[str, int], method: Technique, settings, lattice: float, seed: int, progress: Progress) -> bool:
+    def _measure(self, key: tuple[str, int], method: Technique | AtlasSweep, settings, lattice: float, seed: int,
+                 progress: Progress) -> bool:
         """True if the bake was measured; a technique that cannot bake this scene is left out with the reason."""
         name = f"{method.name}, setting {key[1] + 1}, seed {seed}"
         stored = self._parts.load(name)
@@ -249,7 +269,7 @@ class _Survey:
         self.runs.setdefault(key, []).append(run)
         return True
 
-    def _measured(self, method: Technique, settings, lattice: float, seed: int, progress: Progress) -> tuple:
+    def _measured(self, method: Technique | AtlasSweep, settings, lattice: float, seed: int, progress: Progress) -> tuple:
         """The estimates of a bake, what else is known of it as a document, and its field; or the reason why there is none."""
         try:
             if method.name not in self._warm:
@@ -263,7 +283,7 @@ class _Survey:
         return run.estimates, about, run.baked
 
 
-def _sweep(method: Technique) -> list[tuple[object, float]]:
+def _sweep(method: Technique | AtlasSweep) -> list[tuple[object, float]]:
     """What is measured of a technique: its settings on the scene's own lattices, its defaults on coarser ones before and on finer
     ones after them."""
     coarser, finer = (sorted(factor for factor in method.lattices if (factor > 1.0) == above) for above in (False, True))
@@ -278,7 +298,7 @@ def _maps(survey: _Survey, progress: Progress) -> dict[str, tuple[str, ErrorMap,
     if not len(error_map.seen):
         return {}
     pictures = {"reference.png": ("indirect irradiance, path tracer", error_map, error_map.reference_picture())}
-    for number, method in enumerate(survey.methods):
+    for number, method in enumerate(method for method in survey.methods if method is not ATLAS_SWEEP):
         span = progress.span(_TRACED, 1.0).span(number / len(survey.methods), (number + 1) / len(survey.methods))
         span.step(0.0, f"Error map of {method.name}")
         run = survey.baked_defaults(method, span)

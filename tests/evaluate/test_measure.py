@@ -23,7 +23,7 @@ def yard():
 def test_probes_in_a_furnace_are_right_everywhere(yard):
     probes = techniques.get("probes")
     run = yard.measure(probes, build_settings(probes, {"error": 0.02}), seed=0)
-    assert set(run.errors) == set(PLACES) - {"known"}
+    assert set(run.errors) == set(PLACES) - {"known", "atlas"}
     for place, errors in run.errors.items():
         assert errors.error < 0.03 and abs(errors.bias) < 0.02, place
         assert errors.energy == pytest.approx(1 + errors.bias) and errors.leak is None, place

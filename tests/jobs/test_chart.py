@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 import pytest
 import scene_builders as build
+from atlas_scenes import cube_map, in_atlas
 from offset_technique import OffsetTechnique
 
 from rtgi_addon import techniques
@@ -226,3 +227,23 @@ def test_every_technique_in_a_box(tmp_path):
     assert [point.lattice for point in chart.points if point.technique == "probes"] == [0.5, 1, 1, 1, 1, 1, 1, 2]
     assert best["probes"] < 0.02 and best["vpl"] < 0.1 < best["rsm"]
     assert all(point.cost("peak_bytes") is None or point.cost("peak_bytes") > 0 for point in chart.points)
+
+
+def test_the_light_atlas_is_charted_on_its_surfaces(furnace, offset, tmp_path):
+    charted = in_atlas(furnace, 0, cube_map(furnace))
+    report = chart_scene(charted, tmp_path / "chart", ["offset", "atlas"], seeds=1, maps=False, **QUICK)
+    points = {(point.technique, point.label): point for point in report.chart.points}
+    assert report.chart.receivers["atlas"] == 8 and report.chart.techniques("surface") == ["offset"]
+    assert points["offset", "defaults"].error("atlas") == points["offset", "defaults"].error("own_normals")
+    # The furnace's light is the same everywhere: pi times its radiance, at any density.
+    atlas = [point for point in report.chart.points if point.technique == "atlas"]
+    assert sum(point.default for point in atlas) == 1 and len(atlas) == 5
+    for point in atlas:
+        assert set(point.accuracy) == {"atlas"} and abs(point.accuracy["atlas"].bias.mean) < 0.05
+    assert atlas[0].field_bytes < atlas[-2].field_bytes and "## Light atlas" in (tmp_path / "chart" / "chart.md").read_text()
+    assert "on surfaces in the light atlas" in report.to_text()
+
+
+def test_an_atlas_that_no_object_is_in_is_refused(furnace, tmp_path):
+    with pytest.raises(BakeError, match="no object is in the light atlas"):
+        chart_scene(furnace, tmp_path / "chart", ["atlas"], seeds=1, maps=False, **QUICK)

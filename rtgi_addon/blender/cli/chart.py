@@ -3,7 +3,7 @@
 import argparse
 
 from ... import techniques
-from ...jobs.chart import MOST_SECONDS, ChartReport, chart_scene, check_chart
+from ...jobs.chart import MOST_SECONDS, ChartReport, chart_scene, check_chart, known_techniques
 from ...jobs.chart_pictures import known_effects
 from .base import EXTRACT_SHARE, Session, Subcommand
 from .options import above_zero, at_least
@@ -12,7 +12,8 @@ from .options import above_zero, at_least
 def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", required=True, metavar="DIR", help="where chart.json, chart.md and the pictures go")
     parser.add_argument("--techniques", nargs="*", metavar="NAME",
-                        help=f"default: all of {', '.join(techniques.names())}; with no name none, for pictures alone")
+                        help=f"default: all of {', '.join(techniques.names())}, and atlas, the light atlas, where objects are in "
+                             "it; with no name none, for pictures alone")
     parser.add_argument("--reference", choices=("path", "cycles"), default="path",
                         help="what is held to be right: this project's path tracer (default) or Cycles")
     parser.add_argument("--noise", type=above_zero, default=0.01, metavar="E",
@@ -33,8 +34,7 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _check(arguments: argparse.Namespace) -> None:
-    for name in arguments.techniques or ():
-        techniques.get(name)
+    known_techniques(arguments.techniques)
     known_effects(arguments.effects)
 
 

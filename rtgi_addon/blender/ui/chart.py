@@ -147,6 +147,8 @@ class RTGI_PT_chart(ToolPanel, bpy.types.Panel):
         if not chart.complete and not charts.running:
             draw_lines(layout, iface_("Cancelled before the end"), width, "INFO")
         draw_table(layout, iface_("Error"), ranking(chart), "SOLO_ON")
+        if chart.measured("atlas"):
+            draw_table(layout, iface_("Error in the Light Atlas"), ranking(chart, "atlas"), "SOLO_ON")
         if chart.pictures is not None:
             draw_table(layout, iface_("Error of the Picture"), picture_ranking(chart.pictures), "SOLO_ON")
         draw_lines(layout, folder.name, width, "FILE_FOLDER")
@@ -158,16 +160,13 @@ def _folder_of(scene: bpy.types.Scene) -> Path:
     return output.with_name(output.name + "_chart")
 
 
-def ranking(chart: Chart) -> list[tuple[bool, str, str, str]]:
-    """The settings of ``chart`` from the least error: whether it is on the Pareto front, technique and setting, error, time."""
-    front = set(chart.front())
-    order = sorted(range(len(chart.points)), key=lambda index: chart.points[index].error())
-    rows = []
-    for index in order[:_MOST_ROWS]:
-        point = chart.points[index]
-        rows.append((index in front, f"{point.technique}, {point.label}", f"{100 * point.error():.2g}%",
-                     spoken(point.seconds.mean)))
-    return rows
+def ranking(chart: Chart, place: str = "surface") -> list[tuple[bool, str, str, str]]:
+    """The settings of ``chart`` from the least error in ``place``: whether it is on the Pareto front, technique and setting, error,
+    time."""
+    front, points = set(chart.front("seconds", place)), list(enumerate(chart.points))
+    order = sorted((entry for entry in points if place in entry[1].accuracy), key=lambda entry: entry[1].error(place))
+    return [(index in front, f"{point.technique}, {point.label}", f"{100 * point.error(place):.2g}%", spoken(point.seconds.mean))
+            for index, point in order[:_MOST_ROWS]]
 
 
 def picture_ranking(pictures: PictureChart) -> list[tuple[bool, str, str, str]]:

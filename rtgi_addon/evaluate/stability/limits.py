@@ -61,7 +61,7 @@ LIMITS: dict[str, dict[str, Limit]] = {
                         "lpv": Limit(0.92, "what is reflected fifty times takes thousands of steps")},
     "emitter-size": {"probes": Limit(0.17, _CELL), "vpl": Limit(0.3, _NOISE), "lpv": Limit(0.25, _SPREAD)},
     "one-direction": {
-        "probes": Limit(0.24, "the window that removes every negative lobe costs up to 42 % of the peak; see other readings")},
+        "probes": Limit(0.24, "removing every negative lobe costs a third of the peak at order 1; see other readings")},
     "negative-light": {"probes": Limit(0.28, "SH of one direction ring: by -0.25 at order 1, -0.04 at order 2")},
     "fireflies": {"probes": Limit(0.7, _CELL), "vpl": Limit(1.4, _NOISE), "rsm": Limit(0.9, "the noise of 400 samples")},
     "lone-plate": {"probes": Limit(0.01), "vpl": Limit(1e-4), "rsm": Limit(1e-4), "lpv": Limit(0.01)},
@@ -75,6 +75,8 @@ LIMITS: dict[str, dict[str, Limit]] = {
                      "rsm": Limit(0.03, "texels cross the edges of shadows"),
                      "lpv": Limit(0.02, "texels move from cell to cell")},
     "sun-sweep": {"transfer": Limit(0.01)},
+    "atlas-sun-sweep": {"transfer": Limit(0.035, "64 directions are 18 degrees apart, and shadows move between them")},
+    "atlas-border": {"probes": Limit(0.015), "transfer": Limit(0.015)},
     "camera-dolly": {"lpv": Limit(0.002)},
     "live-switch": {"probes": Limit(1.12, "every bounce waits for the one before: 1/(1 - albedo) times as long in a closed room")},
     "live-ghosts": {"probes": Limit(0.03)},

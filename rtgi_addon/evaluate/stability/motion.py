@@ -40,10 +40,10 @@ def _point_frame(step: int) -> Scene:
 
 
 def _sun_frame(step: int) -> Scene:
-    return _yard(np.degrees(step * CREEP * 3.0 / TEXELS))
+    return yard(np.degrees(step * CREEP * 3.0 / TEXELS))
 
 
-def _yard(degrees: float) -> Scene:
+def yard(degrees: float) -> Scene:
     """A yard with a pillar and a wall under a sun that has turned by ``degrees`` about +Z."""
     turn = rotation((0, 0, 1), degrees)
     direction = turn[:3, :3] @ np.array([0.5, 0.2, -1.0])
@@ -79,11 +79,11 @@ def _light_motion(bench: Bench) -> list[Sample]:
 def _sun_sweep(bench: Bench) -> list[Sample]:
     """The error's change over time, against probes whose texels are lit by the very sun: a constant error is none."""
     truth = replace(bench, technique="probes", settings={})
-    swept, exact = bench.bake(_yard(0.0), **coarse(bench)), truth.bake(_yard(0.0), **coarse(truth))
+    swept, exact = bench.bake(yard(0.0), **coarse(bench)), truth.bake(yard(0.0), **coarse(truth))
     points, normals = _yard_receivers()
     errors, light = [], []
     for step in range(FRAMES):
-        built = _yard(step * SWEEP)
+        built = yard(step * SWEEP)
         light.append(brightness(exact.relight(built), points, normals))
         errors.append(brightness(swept.relight(built), points, normals) - light[-1])
     moved = np.array(errors) - np.mean(errors, axis=0)

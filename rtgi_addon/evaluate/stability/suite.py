@@ -5,12 +5,12 @@ from collections.abc import Iterable
 
 from ...errors import BakeError, UsageError
 from ...progress import Progress
-from . import energy, geometry, leaks, live, media, motion, reflections, scattered, spheres, style, voxels
+from . import atlas, energy, geometry, leaks, live, media, motion, reflections, scattered, spheres, style, voxels
 from .case import Bench, Case, Result, Sample, Variant
 
 CASES: dict[str, Case] = {case.name: case
                           for family in (leaks, geometry, energy, motion, live, style, media, reflections, spheres, voxels,
-                                         scattered)
+                                         scattered, atlas)
                           for case in family.CASES}
 
 

@@ -72,7 +72,8 @@ def test_scripts_dering_as_numpy(probes, tmp_path):
     zonal, cosine = np.sqrt(5.0 / np.pi) / 4.0, sh.cosine_coefficients(2)[[0, 1, 4]]
     factors = cosine * [np.sqrt(1.0 / (4.0 * np.pi)), np.sqrt(3.0 / (4.0 * np.pi)), np.sqrt(15.0 / (4.0 * np.pi))]
     numbers = ", ".join(f"COSINE_{band} = {factor}" for band, factor in enumerate(factors))
-    script = (f"const COEFFICIENTS = 9, {numbers}, COSINE_2_ZONAL = {cosine[2] * zonal};\n" + text[text.index("function dering(c)"):]
+    text = text[text.index("function dering(c)"):]
+    script = (f"const COEFFICIENTS = 9, {numbers}, COSINE_2_ZONAL = {cosine[2] * zonal};\n" + text
               + "\nconst all = JSON.parse(require('fs').readFileSync(0));\nall.forEach((one) => dering(one));\n"
               "console.log(JSON.stringify(all));")
     (tmp_path / "dering.cjs").write_text(script)

@@ -164,6 +164,7 @@ INTERFACE: dict[str, str] = {
     "Also hold pictures with effects to Cycles', through the scene's camera; Blender waits while it renders":
         "Auch Bilder mit Effekten durch die Kamera der Szene mit denen von Cycles vergleichen; Blender wartet, solange es rendert",
     "Error of the Picture": "Fehler des Bildes",
+    "Error in the Light Atlas": "Fehler im Lichtatlas",
     "Reference": "Referenz",
     "What is held to be right": "Was als richtig gilt",
     "Path Tracer": "Pfadverfolgung",

@@ -291,6 +291,11 @@ SENTENCES: dict[str, str] = {
     "a chart without techniques and without pictures of effects has nothing to measure":
         "ein Vergleich ohne Techniken und ohne Bilder mit Effekten hat nichts zu messen",
     "name a technique": "eine Technik nennen",
+    "no object is in the light atlas": "kein Objekt ist im Lichtatlas",
+    "name one (--atlas OBJECT), or put it there in its properties":
+        "eines nennen (--atlas OBJEKT) oder in seinen Eigenschaften hineinnehmen",
+    "no surface in the light atlas is seen from a probe": "keine Fläche im Lichtatlas ist von einer Sonde aus zu sehen",
+    "put one there that is, or measure more points": "eine hineinnehmen, die es ist, oder mehr Punkte messen",
     "the effect {0} draws as nothing looks: no picture says how right it is":
         "der Effekt {0} zeichnet, wie nichts aussieht: Kein Bild sagt, wie richtig das ist",
     "choose of {0}": "unter {0} wählen",
