@@ -22,6 +22,8 @@ from .between import Between, cells_before, shown_between
 # Passes that are held at once, for one product with the basis; a pass takes all directions that go the same way along each axis and
 # are steepest along the same.
 _TOGETHER = 4
+# Numbers of a pass that are multiplied at once.
+_AT_ONCE = 1 << 17
 
 
 def sweep(standing: Between, opacity: np.ndarray, radiance: np.ndarray, directions: int, order: int,
@@ -51,7 +53,10 @@ def sweep(standing: Between, opacity: np.ndarray, radiance: np.ndarray, directio
             progress.step(index / len(groups), "sweeping the voxels")
         arriving = parallel_for(lambda k, group=group: _pass(stairs, towards[group[k]], outside(group[k])), len(group), threads)
         for rows, light in zip(group, arriving, strict=True):
-            result += basis[rows].T @ light.reshape(len(rows), -1)
+            flat = light.reshape(len(rows), -1)
+            for first in range(0, flat.shape[1], _AT_ONCE):
+                part = slice(first, first + _AT_ONCE)
+                result[:, part] += basis[rows].T @ flat[:, part]
     return np.moveaxis(result.reshape(-1, *shape, 3), 0, -2)
 
 
