@@ -18,7 +18,8 @@ from ...techniques.lamp_light import LampLight
 from ...techniques.lattice.placement import PILOT_RAYS, place_points
 from ...techniques.probes import LAMP_SAMPLES
 from ...techniques.probes.adaptive import FIRST_ROUND, SAMPLING_SHARE, SLOPE, ErrorModel
-from ...techniques.probes.bake import Begun, mean_distances, surface_cache
+from ...techniques.probes.bake import Begun, surface_cache
+from ...techniques.probes.distances import mean_distances
 from ...techniques.probes.gather import GROUP
 from ...techniques.probes.gathering import HALVES, light_at_receivers
 from ...techniques.probes.settings import ProbeSettings

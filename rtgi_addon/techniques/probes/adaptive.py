@@ -12,6 +12,9 @@ points (Owen, "Scrambled Net Variance for Integrals of Smooth Functions", Ann. S
 doubling gives a, and two or more give s: from ½, that of independent rays, to 3/2, that of smooth functions; about 1 in plain
 rooms; sharp patches of light have 0.65. Between powers of two a sequence errs hardly less than at the one before: the points beyond
 it are those of a smaller net.
+
+Where rays are spread anew by what the first have found (strata.py), a is another from then on and s the same: what came before
+tells a only until two sections of what followed have been compared, and what some groups gain is thought to hold for the others.
 """
 
 from dataclasses import dataclass
@@ -29,6 +32,8 @@ LEAST_SLOPE, MOST_SLOPE = 0.5, 1.5
 FREEDOM = 4.0
 # One probe's difference is one sample of its error: lean on the mean of its neighbours by this share.
 POOLED = 0.5
+# Rays that are spread anew have this share of the variance of as many others, at least and at most.
+LEAST_GAIN, MOST_GAIN = 0.2, 1.0
 # Weight of what earlier rounds said of a probe's error in what the next one makes of it.
 REMEMBERED = 0.5
 # Share of the target left to the sampling of probe rays; the rest is for the surface cache.
@@ -42,12 +47,14 @@ class ErrorModel:
     """Keeps the sums of each probe's rays and says what error they have.
 
     ``total`` (p, k, 3) float64 sums of 4π·L·Y over all ``rays`` (p,) int64. ``brightness`` is the RMS norm of the coefficients of
-    all probes of the bake, where these are but some of them (None: they are all).
+    all probes of the bake, where these are but some of them (None: they are all). ``turned`` (p,) int64 is the number of rays
+    beyond which they are spread in another way than before (0: they are not).
     """
 
     def __init__(self, probes: int, coefficients: int, brightness: float | None = None):
         self.total = np.zeros((probes, coefficients, 3))
         self.rays = np.zeros(probes, np.int64)
+        self.turned = np.zeros(probes, np.int64)
         self._brightness = brightness
         # w₁·w₂·d² (p,) of each pair of sections (n₁, n₂), NaN where a probe was not asked.
         self._squares: dict[tuple[int, int], np.ndarray] = {}
@@ -59,8 +66,9 @@ class ErrorModel:
     def add(self, probes: np.ndarray, sums: np.ndarray, rays: np.ndarray) -> None:
         """Add the ``sums`` (m, k, 3) of ``rays`` (m,) further rays of ``probes`` (m,), and compare them with those before."""
         before = self.rays[probes]
-        for n1, n2 in np.unique(np.stack([before, rays], axis=1)[before > 0], axis=0).tolist():
-            alike = np.flatnonzero((before == n1) & (rays == n2))
+        compared = (before > 0) & (before != self.turned[probes])
+        for n1, n2 in np.unique(np.stack([before, rays], axis=1)[compared], axis=0).tolist():
+            alike = np.flatnonzero(compared & (before == n1) & (rays == n2))
             difference = self.total[probes[alike]] / n1 - sums[alike] / n2
             column = self._squares.setdefault((n1, n2), np.full(len(self.rays), np.nan))
             column[probes[alike]] = (difference**2).sum(axis=(1, 2)) * (n1 * n2 / (n1 + n2) ** 2)
@@ -71,11 +79,11 @@ class ErrorModel:
         """Everything it knows, for a checkpoint."""
         pairs = np.array(list(self._squares), np.int64).reshape(-1, 2)
         squares = np.array(list(self._squares.values())).reshape(len(pairs), len(self.rays))
-        return {"total": self.total, "rays": self.rays, "pairs": pairs, "squares": squares}
+        return {"total": self.total, "rays": self.rays, "turned": self.turned, "pairs": pairs, "squares": squares}
 
     def restore(self, arrays: dict[str, np.ndarray]) -> None:
         """Take up from ``state``."""
-        self.total, self.rays = arrays["total"], arrays["rays"]
+        self.total, self.rays, self.turned = arrays["total"], arrays["rays"], arrays["turned"].copy()
         pairs = map(tuple, arrays["pairs"].tolist())
         self._squares = {pair: squares.copy() for pair, squares in zip(pairs, arrays["squares"], strict=True)}
 
@@ -119,12 +127,12 @@ class ErrorModel:
         squares = np.where(known, squares, 0.0)
         members = np.stack([np.bincount(groups, column, count) for column in known.T], axis=1)
         means = np.stack([np.bincount(groups, column, count) for column in squares.T], axis=1) / np.maximum(members, 1)
-        slope = _slopes(np.log([n1 + n2 for n1, n2 in pairs]), means)
-        # The latest comparison has half the say, the one before it half of the rest.
-        age = np.cumsum(known[:, ::-1], axis=1)[:, ::-1] - 1
-        weight = np.where(known, REMEMBERED**age, 0.0)
+        turned = self.turned[probes]
+        later = (turned[:, None] > 0) & (np.array([n1 for n1, _ in pairs]) > turned[:, None])
+        of_groups = np.stack([np.bincount(groups, column, count) > 0 for column in later.T], axis=1)
+        slope = _slopes(np.log([n1 + n2 for n1, n2 in pairs]), means, of_groups)
         alone = squares / np.stack([_disagreement(n1, n2, slope) for n1, n2 in pairs], axis=1)[groups]
-        alone = (alone * weight).sum(axis=1) / np.maximum(weight.sum(axis=1), 1e-300)
+        alone = _since(alone, known, later, (turned > 0) & (self.rays[probes] > turned))
         pooled = (np.bincount(groups, alone, count) / np.maximum(np.bincount(groups, minlength=count), 1))[groups]
         return (1.0 - POOLED) * alone + POOLED * pooled, slope
 
@@ -166,21 +174,38 @@ class Forecast:
         return np.minimum(rays * 2**times, np.maximum(highest, rays))[self.groups]
 
 
+def _since(alone: np.ndarray, known: np.ndarray, later: np.ndarray, beyond: np.ndarray) -> np.ndarray:
+    """The a (m,) that probes have now, from what each comparison says of it, ``alone`` (m, l), where ``known`` (m, l): of those
+    ``later`` (m, l) than the turn, if there are any. Probes that are ``beyond`` (m,) it without a comparison are thought to have
+    gained what others did."""
+    def remembered(chosen):
+        # The latest comparison has half the say, the one before it half of the rest.
+        age = np.cumsum(chosen[:, ::-1], axis=1)[:, ::-1] - 1
+        weight = np.where(chosen, REMEMBERED**age, 0.0)
+        return (alone * weight).sum(axis=1) / np.maximum(weight.sum(axis=1), 1e-300)
+
+    before, after = remembered(known & ~later), remembered(known & later)
+    told = (known & later).any(axis=1)
+    gain = np.clip(after[told].sum() / max(before[told].sum(), 1e-300), LEAST_GAIN, MOST_GAIN) if told.any() else MOST_GAIN
+    return np.where(told, after, np.where(beyond, gain, 1.0) * before)
+
+
 def _disagreement(n1: int, n2: int, slope: np.ndarray) -> np.ndarray:
     """w₁·w₂·E[d²] (g,) of sections of ``n1`` and ``n2`` points where V(n) = n^−2s with s = ``slope`` (g,)."""
     exponent, whole = -2.0 * slope, float(n1 + n2)
     return (n1 * float(n1) ** exponent + n2 * float(n2) ** exponent) / whole - whole**exponent
 
 
-def _slopes(logs: np.ndarray, means: np.ndarray) -> np.ndarray:
+def _slopes(logs: np.ndarray, means: np.ndarray, later: np.ndarray) -> np.ndarray:
     """The s (g,) of groups of probes from their mean squared differences ``means`` (g, l) (0: unknown) at numbers of rays with
     ``logs`` (l,): straight lines by least squares, of all groups together first, from which each departs as far as its own
-    differences and the usual departure say."""
+    differences and the usual departure say. Of those that are ``later`` (g, l) and those that are not the lines are parallel."""
     known = means > 0
-    count = np.maximum(known.sum(axis=1), 1)[:, None]
     x = np.where(known, logs, 0.0)
     y = np.where(known, np.log(np.where(known, means, 1.0)), 0.0)
-    x, y = (np.where(known, part - part.sum(axis=1, keepdims=True) / count, 0.0) for part in (x, y))
+    for alike in (known & later, known & ~later):
+        count = np.maximum(alike.sum(axis=1), 1)[:, None]
+        x, y = (part - alike * ((part * alike).sum(axis=1, keepdims=True) / count) for part in (x, y))
     # A mean of squares with ν degrees of freedom has a logarithm of variance 2/ν.
     precision = (x**2).sum(axis=1) * FREEDOM / 2.0
     own = -0.5 * (x * y).sum(axis=1) * FREEDOM / 2.0

@@ -3,12 +3,12 @@
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from ...numerics import octahedral, sh
+from ...numerics import sh
 from ...progress import Progress
 from ...scene import ProbeVolume
 from ...scene.memory import require_memory
@@ -23,14 +23,18 @@ from ..lattice.coverage import require_open
 from ..lattice.focus import focus, spacing_of
 from ..lattice.placement import Placement, place
 from .adaptive import FIRST_ROUND, SAMPLING_SHARE, ErrorModel
-from .gather import GROUP, RAYS_PER_LIGHT_SAMPLE, Gatherer, Item, gather
+from .distances import mean_distances
+from .gather import GROUP, RAYS_PER_LIGHT_SAMPLE, Gatherer, gather
 from .item_rays import BLOCK_RAYS, ITEM_RAYS
+from .items import Item
 from .memory import BYTES_PER_HIT, ray_bytes, working_bytes
 from .reach import Reach, reach_of
 from .relight import MAX_KEPT_RAYS, HitMemory
 from .settings import ProbeSettings
 from .shares import TEXEL_COST, Shares
+from .spreading import Spreading
 from .started import HALF_RAYS, StartedProbes, that_fit
+from .strata import CELLS, REFINED, Spread
 
 # Rays of all the items that are held in memory between tracing and shading.
 BATCH_RAYS = 1 << 22
@@ -53,11 +57,6 @@ TEXEL_SHARE, MOST_REFINED = 0.25, 2.0
 USUAL_ROUNDS = 6.0
 # How far a bake is when probes are placed, and when all rays are traced.
 PLACED, TRACED = 0.02, 0.97
-# What a cell of a probe's tile takes from those around it: by the cosine to this power, and so little that it counts only where the
-# cell has no ray of its own.
-SPREAD_POWER, SPREAD_WEIGHT = 64, 1e-4
-# Less than this share of a cell is none: what is denormal in float32 would take fifteen times as long and say nothing.
-LEAST_SPREAD = 1e-30
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,8 +117,10 @@ class ProbeBake:
         else:
             self._reach = reach_of(context, self.cache.layout, measured, seed) if settings.bounces != 0 else Reach(0, 1.0)
         require_memory(working_bytes(self.cache, settings, self._reach, len(measured), BATCH_RAYS, MAX_KEPT_RAYS))
-        self.gatherer = Gatherer(context, self.cache, self.placement, settings, seed)
         count = len(self.placement.positions)
+        self._spreading = Spreading(count, seed) if settings.rays is None and self._most >= REFINED else None
+        strata = self._spreading and self._spreading.strata
+        self.gatherer = Gatherer(context, self.cache, self.placement, settings, seed, strata, keeps_light=strata is not None)
         self.model = ErrorModel(count, sh.coefficient_count(settings.order), None if block is None else block.brightness)
         side = settings.visibility_resolution
         self._distance = np.zeros((count, side * side, 2), np.float32)
@@ -146,6 +147,8 @@ class ProbeBake:
         self._distance[probes], self._distance_weight[probes] = started.distance[rows], started.weight[rows]
         if self.emitted is not None and started.emitted is not None:
             self.emitted[probes] = started.emitted[rows, :k]
+        if self._spreading is not None:
+            self._spreading.keep(probes, started.light[rows], None if started.glow is None else started.glow[rows])
         for memory in started.memory:
             self.memory.take_over(memory)
         self.ray_count += len(probes) * 2 * HALF_RAYS
@@ -166,6 +169,11 @@ class ProbeBake:
                     require_memory({"rays": ray_bytes(self._expected_rays(), self._reach.hits, BATCH_RAYS, MAX_KEPT_RAYS)})
                 self._next = 0
                 self._sums[:] = 0
+                if self._spreading is not None and self._round >= len(self._rounds):
+                    # Where twice as many will do they are spread well enough.
+                    probes = np.flatnonzero((self.model.rays == CELLS) & (self._rays_needed() > REFINED))
+                    turned = self._spreading.refine(self.gatherer, probes, self.model.total, self.emitted)
+                    self.model.turned[turned] = CELLS
             self._trace_round()
             added = self._goal - self.model.rays
             probes = np.flatnonzero(added)
@@ -183,8 +191,11 @@ class ProbeBake:
 
     @property
     def _most(self) -> int:
-        """The most rays of a probe, in whole samples of light."""
-        return max(2 * RAYS_PER_LIGHT_SAMPLE, self.settings.max_rays // RAYS_PER_LIGHT_SAMPLE * RAYS_PER_LIGHT_SAMPLE)
+        """The most rays of a probe: in whole samples of light, and as often doubled as may be where they are spread anew."""
+        most = self.settings.max_rays
+        if most >= REFINED and self.settings.rays is None:
+            return 1 << (most.bit_length() - 1)
+        return max(2 * RAYS_PER_LIGHT_SAMPLE, most // RAYS_PER_LIGHT_SAMPLE * RAYS_PER_LIGHT_SAMPLE)
 
     def _plan(self) -> np.ndarray | None:
         """How many rays each probe (p,) shall have after the next round, or None when enough were traced."""
@@ -235,12 +246,16 @@ class ProbeBake:
         of_key = np.repeat(np.arange(len(key)), blocks)
         first = key[of_key, 1] + BLOCK_RAYS * (np.arange(len(of_key)) - np.repeat(np.cumsum(blocks) - blocks, blocks))
         count = np.minimum(BLOCK_RAYS, key[of_key, 2] - first)
+        spread = None if self._spreading is None else self._spreading.spread(key)
+        starts = np.cumsum(key[:, 2] - key[:, 1]) - key[:, 2]
         items = []
         for rays, size in np.unique(np.stack([count, sizes[of_key]], axis=1), axis=0).tolist():
             alike = np.flatnonzero((count == rays) & (sizes[of_key] == size))
             step = max(1, ITEM_RAYS // (rays * size))
             for chunk in (alike[i:i + step] for i in range(0, len(alike), step)):
-                items.append(Item(key[of_key[chunk], 0], members[of_key[chunk], :size], first[chunk], rays))
+                which = (starts[of_key[chunk]] + first[chunk])[:, None] + np.arange(rays)
+                anew = None if spread is None else Spread(*(part[which] for part in spread))
+                items.append(Item(key[of_key[chunk], 0], members[of_key[chunk], :size], first[chunk], rays, anew))
         return items
 
     def _trace_round(self) -> None:
@@ -274,16 +289,22 @@ class ProbeBake:
             self.memory.keep(item, hits, texel, sums)
             if sums.emitted is not None:
                 self.emitted[sums.probes] += sums.emitted
+            if sums.along is not None:
+                self._spreading.keep_item(item, sums.along)
 
     def _state(self) -> dict[str, np.ndarray]:
         numbers = np.array([self._round, self._next, self.ray_count], np.int64)
         kept = labelled("cache", cache_state(self.cache)) | labelled("model", self.model.state())
+        if self._spreading is not None:
+            kept |= labelled("spreading", self._spreading.state())
         return kept | {"numbers": numbers, "goal": self._goal, "sums": self._sums, "distance": self._distance,
                        "distance_weight": self._distance_weight}
 
     def _restore(self, arrays: dict[str, np.ndarray]) -> None:
         restore_cache(self.cache, part_of(arrays, "cache"))
         self.model.restore(part_of(arrays, "model"))
+        if self._spreading is not None:
+            self._spreading.restore(part_of(arrays, "spreading"))
         self._round, self._next, self.ray_count = (int(number) for number in arrays["numbers"])
         self._goal, self._sums = arrays["goal"], arrays["sums"]
         self._distance, self._distance_weight = arrays["distance"], arrays["distance_weight"]
@@ -336,23 +357,6 @@ def batches(items: list[Item]) -> Iterator[list[Item]]:
             stop += 1
         yield items[start:stop]
         start = stop
-
-
-def mean_distances(sums: np.ndarray, weight: np.ndarray, resolution: int) -> np.ndarray:
-    """Mean and mean squared distance (p, T², 2) from ``sums`` (p, T², 2) over the rays in each cell of a tile of ``resolution`` T
-    and their numbers ``weight`` (p, T²)."""
-    around = _spread(resolution)
-    # Probe by probe: OpenBLAS starts threads of its own for larger products, which wait for each other longer than they work.
-    spread = weight + np.matmul(around, weight[:, :, None])[:, :, 0]
-    return (sums + np.matmul(around, sums)) / np.maximum(spread, LEAST_SPREAD)[:, :, None]
-
-
-@cache
-def _spread(resolution: int) -> np.ndarray:
-    """What each cell of a tile of ``resolution`` T adds to each other (T², T²) float32."""
-    directions = octahedral.texel_directions(resolution).reshape(-1, 3)
-    around = np.maximum(directions @ directions.T, 0) ** SPREAD_POWER * SPREAD_WEIGHT
-    return np.where(around < LEAST_SPREAD, 0.0, around).astype(np.float32)
 
 
 def surface_cache(context: LightContext, volumes: tuple[ProbeVolume, ...], settings: ProbeSettings, seed: int) -> SurfaceCache:

@@ -5,7 +5,7 @@ points find the same part of the BVH. Groups are scrambled independently of one 
 """
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,7 +24,9 @@ from ...transport.paths.scattering import Walks, walk
 from ...transport.vectors import dot
 from .gather_kernels import can_project, follows, project, projected, shifted, traced, visibility
 from .item_rays import DIRECTION, RAYS_PER_LIGHT_SAMPLE, ItemRays
+from .items import Item
 from .shares import USUAL, Shares
+from .strata import CELLS, Strata
 
 # Probes that share a set of directions.
 GROUP = 8
@@ -37,47 +39,6 @@ SOLVER_SHARE = 0.01
 _BRIGHT_SKY, _EMITTERS, _BRIGHT_SURFACES, _SHIFTS, _WALKS = 3, 4, 5, 17, 23
 _UNIFORM_PDF = np.float32(1.0 / (4.0 * np.pi))
 FULL_SPHERE = np.float32(4.0 * np.pi)
-
-
-@dataclass(frozen=True, eq=False)
-class Item:
-    """Blocks of ``count`` rays of some ``groups`` (g,), from ray ``first`` (g,) of each group's sequence, for as many of its
-    probes: ``probes`` (g, m). ``first`` and ``count`` are multiples of RAYS_PER_LIGHT_SAMPLE; a group may occur with several
-    blocks. Rays are ordered block by block, direction by direction: (g, n, m) with n = ``count``."""
-
-    groups: np.ndarray
-    probes: np.ndarray
-    first: np.ndarray
-    count: int
-
-    @property
-    def shape(self) -> tuple[int, int, int]:
-        """(g, n, m)."""
-        return len(self.groups), self.count, self.probes.shape[1]
-
-    @property
-    def ray_count(self) -> int:
-        """Rays in the item."""
-        return self.probes.size * self.count
-
-    @cached_property
-    def _runs(self) -> np.ndarray:
-        # Blocks of the same probes follow one another.
-        return np.flatnonzero(np.append(True, (np.diff(self.groups) != 0) | (np.diff(self.probes[:, 0]) != 0)))
-
-    @property
-    def merged_probes(self) -> np.ndarray:
-        """The probes (b, m) that ``merged`` sums belong to, each once."""
-        return self.probes[self._runs]
-
-    def merged(self, part: np.ndarray) -> np.ndarray:
-        """Sums (b, …) of ``part`` (g, …) over the blocks of the same probes."""
-        return np.add.reduceat(part, self._runs, axis=0)
-
-    def probe_of(self, rows: np.ndarray) -> np.ndarray:
-        """The probe (h,) that each of the rays ``rows`` (h,) leaves from."""
-        _, n, m = self.shape
-        return self.probes.reshape(-1)[rows // (n * m) * m + rows % m]
 
 
 @dataclass(eq=False)
@@ -115,7 +76,7 @@ class Gathered:
     """An item's sums over the blocks of the same ``probes`` (b, m): ``sh`` (b, m, k, 3) the sum over rays of 4π·L·Y (divide by the
     number of rays), ``emitted`` what of it is light from emissive surfaces (None where nothing emits), ``albedo`` (h, 3) at the
     hits (None where it is each triangle's own), and for visibility the sums (b, m, T², 2) of distance and squared distance over
-    the rays in each cell of the tile, with their numbers (b, 1, T²)."""
+    the rays in each cell of the tile, with their numbers (b, 1, T²). ``along``: what each ray found, where that was asked for."""
 
     probes: np.ndarray
     sh: np.ndarray
@@ -123,16 +84,27 @@ class Gathered:
     albedo: np.ndarray | None
     distance: np.ndarray
     distance_weight: np.ndarray
+    along: "Along | None" = None
+
+
+class Along(NamedTuple):
+    """Radiance (g, n, m, 3) along an item's rays, and what of it is ``emitted`` by surfaces (None where nothing is)."""
+
+    light: np.ndarray
+    emitted: np.ndarray | None
 
 
 class Gatherer:
     """Traces and shades items against one ``context`` and one surface ``cache``, under ``settings``. ``pdf`` is the density [1/sr]
-    of its directions."""
+    of its directions; with ``strata`` it is that before some of them take more than others, whose rays count for less. It
+    ``keeps_light`` along the first rays, which tell where those go."""
 
     pdf = _UNIFORM_PDF
 
-    def __init__(self, context: LightContext, cache: SurfaceCache, placement, settings, seed: int):
+    def __init__(self, context: LightContext, cache: SurfaceCache, placement, settings, seed: int, strata: Strata | None = None,
+                 keeps_light: bool = False):
         self.context, self.cache, self._placement, self.settings, self._seed = context, cache, placement, settings, seed
+        self._strata, self._keeps_light = strata, keeps_light
         self._hit_light = HitLight(cache)
         self._order, self._resolution = settings.order, settings.visibility_resolution
         self._albedo = context.surfaces.albedo_by_triangle()
@@ -185,11 +157,11 @@ class Gatherer:
 
     def under(self, context: LightContext, cache: SurfaceCache) -> "Gatherer":
         """The same probes and directions under other light."""
-        return Gatherer(context, cache, self._placement, self.settings, self._seed)
+        return Gatherer(context, cache, self._placement, self.settings, self._seed, self._strata)
 
     def _numbers(self, item: Item, last: int, first: int = 0) -> np.ndarray:
         """Dimensions ``first`` … ``last`` − 1 of the groups' sequences: (g, n, last − first)."""
-        index = item.first[:, None] + np.arange(item.count)
+        index = item.first[:, None] + np.arange(item.count) if item.spread is None else item.spread.order
         return sobol_owen_at(index, last, hash_u32(self._seed, item.groups)[:, None], first=first)
 
     def _light_numbers(self, item: Item, dimensions: int, purpose: int) -> np.ndarray:
@@ -211,18 +183,24 @@ class Gatherer:
                 alike = len(self._albedo) == len(texel)
                 of_hits = np.take(self._albedo, hits.primitive, axis=0) if alike else self._albedo
             reflected = self._hit_light.reflected(hits, texel, of_hits, rays)
-        basis = self.basis(item, traced.directions)
+        basis = self.ray_basis(item, traced.directions)
         sky = None if self.context.environment.is_black else self.context.environment.base_radiance(traced.directions)
         scattered = None if traced.media is None else self._scattered(traced.media, ends)
         total = self._projected(item, traced, basis, reflected, sky, scattered) + self._light_samples(item, texel is not None)
+        along = None
+        if self._keeps_light and item.first[0] < CELLS:
+            along = Along(self._along(item, traced, reflected, sky, scattered), None)
         emitted = None
         if self.context.surfaces.has_emission or self.context.media.is_emissive:
             glow = self._emitted(item, traced) if self.context.surfaces.has_emission else np.zeros_like(reflected)
             of_media = None if traced.media is None else traced.media.walks.emitted
             emitted = self._projected(item, traced, basis, glow, None, of_media) + self._emitter_samples(item)
             total = total + emitted
+            if along is not None:
+                glow = self._along(item, traced, glow, None, of_media)
+                along = Along(along.light + glow, glow)
         return Gathered(item.merged_probes, item.merged(total), None if emitted is None else item.merged(emitted), albedo,
-                        *(item.merged(part) for part in self._visibility(item, traced)))
+                        *(item.merged(part) for part in self._visibility(item, traced)), along)
 
     def look(self, item: Item, traced: Traced) -> Gathered:
         """What rays tell without light: ``Gathered`` with no SH."""
@@ -237,12 +215,30 @@ class Gatherer:
         """SH basis (g, n, k) of directions (g·n, 3)."""
         return sh.evaluate_rows(directions, self._order).reshape(len(item.groups), -1, sh.coefficient_count(self._order))
 
+    def ray_basis(self, item: Item, directions: np.ndarray) -> np.ndarray:
+        """``basis`` (g, n, k) of the ``directions`` (g·n, 3) of an item's rays, times their weights."""
+        basis, weights = self.basis(item, directions), self._weights(item)
+        return basis if weights is None else basis * weights[:, :, None]
+
+    def _weights(self, item: Item) -> np.ndarray | None:
+        if item.spread is not None:
+            return item.spread.weights
+        # The first rays, once others have followed.
+        if self._strata is None or not self._strata.refined(item.groups).any():
+            return None
+        return self._strata.weights(item.groups, self._numbers(item, DIRECTION))
+
     def _projected(self, item: Item, traced: Traced, basis: np.ndarray, radiance: np.ndarray, sky: np.ndarray | None,
                    along: np.ndarray | None) -> np.ndarray:
         """Sums (g, m, k, 3) of 4π·L·Y: ``radiance`` (h, 3) of what the rays hit, of the others ``sky`` (g·n, 3) in each direction
         (None: black), with what surfaces that rays passed make of it, and ``along`` (g·n·m, 3) the rays (None: nothing)."""
         if traced.tint is None and along is None and can_project(basis):
             return projected(item.shape, basis, traced.rows, radiance, sky) * FULL_SPHERE
+        return project(basis, self._along(item, traced, radiance, sky, along)) * FULL_SPHERE
+
+    @staticmethod
+    def _along(item: Item, traced: Traced, radiance: np.ndarray, sky: np.ndarray | None, along: np.ndarray | None) -> np.ndarray:
+        """Radiance (g, n, m, 3) along the rays, from what ``_projected`` takes."""
         light = np.zeros((*item.shape, 3), np.float32)
         if sky is not None:
             light[:] = sky.reshape(*item.shape[:2], 1, 3)
@@ -251,7 +247,7 @@ class Gatherer:
             light *= traced.tint.reshape(light.shape)
         if along is not None:
             light += along.reshape(light.shape)
-        return project(basis, light) * FULL_SPHERE
+        return light
 
     def _scattered(self, media: InMedia, texel: np.ndarray | None) -> np.ndarray:
         """Radiance (rays, 3) that media scatter along the rays: of light sources, and of what their walks ended on."""
@@ -338,7 +334,8 @@ class Gatherer:
         tiles = self._resolution**2
         sums, weights = np.zeros((g * tiles, m, 2), np.float32), np.zeros(g * tiles, np.float32)
         early = np.flatnonzero(np.repeat(item.first < VISIBILITY_RAYS, n))
-        if early.size and kernels.is_available():
+        weight = self._weights(item) if early.size else None
+        if early.size and weight is None and kernels.is_available():
             return visibility(item.shape, item.first < VISIBILITY_RAYS, octahedral.texel_index(traced.directions, self._resolution),
                               tiles, self._placement.reach[item.probes], traced.rows, traced.t)
         if early.size:
@@ -348,9 +345,10 @@ class Gatherer:
             cell = octahedral.texel_index(traced.directions[early], self._resolution) + early // n * tiles
             order = np.argsort(cell, kind="stable")
             cells, first, count = np.unique(cell[order], return_index=True, return_counts=True)
-            t = t[early[order]]
-            sums[cells, :, 0], sums[cells, :, 1] = np.add.reduceat(t, first, axis=0), np.add.reduceat(t * t, first, axis=0)
-            weights[cells] = count
+            t, each = t[early[order]], None if weight is None else weight.reshape(-1, 1)[early[order]]
+            weighted = t if each is None else t * each
+            sums[cells, :, 0], sums[cells, :, 1] = (np.add.reduceat(part, first, axis=0) for part in (weighted, weighted * t))
+            weights[cells] = count if each is None else np.add.reduceat(each[:, 0], first)
         return sums.reshape(g, tiles, m, 2).transpose(0, 2, 1, 3), weights.reshape(g, 1, tiles)
 
 

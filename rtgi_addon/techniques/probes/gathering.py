@@ -13,8 +13,9 @@ from ...transport.rays.tracer import offset_origins
 from ...transport.vectors import dot
 from ..lamp_light import LampLight
 from ..lattice.placement import Placement
-from .gather import Gatherer, Item, gather
+from .gather import Gatherer, gather
 from .item_rays import BLOCK_RAYS, ITEM_RAYS
+from .items import Item
 from .settings import ProbeSettings
 
 # Variance of a mean over both halves of a sequence, relative to the squared difference of the halves' means. Independent halves

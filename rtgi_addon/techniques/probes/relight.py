@@ -17,7 +17,7 @@ from ..lamp_light import LampLight
 from .gather import FULL_SPHERE, Gatherer, project
 from .gather_kernels import can_project, projected_texels
 
-# Hits of this many rays are kept: 4 bytes each, 1.5 to 12 for the direction that neighbouring probes share, 4 more if they escaped
+# Hits of this many rays are kept: 4 bytes each, 2 to 17 for the direction that neighbouring probes share, 4 more if they escaped
 # and 6 more where albedo varies within triangles.
 MAX_KEPT_RAYS = 1 << 25
 # The cache's solution may be off by this share of the target: ten times as much as a bake's, for it is made while one waits.
@@ -135,7 +135,7 @@ def relit_sums(memory: HitMemory, gatherer: Gatherer, sums: np.ndarray, emitted:
     passed[:, :3] = by_texel[:, :3] - cache.rows.albedo * reflected[:, :3]
 
     def projection(kept: _Kept) -> np.ndarray:
-        basis = gatherer.basis(kept.item, kept.directions)
+        basis = gatherer.ray_basis(kept.item, kept.directions)
         if kept.albedo is None and kept.tint is None and can_project(basis):
             black = not kept.escaped.size or context.environment.is_black
             sky = None if black else context.environment.base_radiance(kept.directions)

@@ -15,8 +15,9 @@ from ...transport.cache.surface_cache import SurfaceCache
 from ...transport.context import LightContext
 from ..lattice.placement import Placement
 from .adaptive import FIRST_ROUND
-from .gather import GROUP, Gatherer, Item, gather
+from .gather import GROUP, Gatherer, gather
 from .item_rays import BLOCK_RAYS, ITEM_RAYS
+from .items import Item
 from .relight import HitMemory
 from .settings import ProbeSettings
 
@@ -31,8 +32,8 @@ class StartedProbes:
     ``settings`` and ``seed``, and how they are placed.
 
     ``first`` and ``second`` (m, k, 3) are sums of 4π·L·Y over HALF_RAYS rays each, ``emitted`` (m, k, 3) what both have of
-    emissive surfaces (None where nothing emits), ``distance`` (m, T², 2) and ``weight`` (m, T²) as a bake sums them, and
-    ``memory`` what the rays hit.
+    emissive surfaces (None where nothing emits), ``light`` and ``glow`` (m, PROBE_RAYS, 3) the same ray by ray, ``distance``
+    (m, T², 2) and ``weight`` (m, T²) as a bake sums them, and ``memory`` what the rays hit.
     """
 
     volume: ProbeVolume
@@ -44,6 +45,8 @@ class StartedProbes:
     first: np.ndarray
     second: np.ndarray
     emitted: np.ndarray | None
+    light: np.ndarray
+    glow: np.ndarray | None
     distance: np.ndarray
     weight: np.ndarray
     memory: tuple[HitMemory, ...]
@@ -68,7 +71,8 @@ class StartedProbes:
         placement = Placement(*(both(name, lambda part: part.placement)
                                 for name in ("positions", "offset", "validity", "measured", "reach")))
         return StartedProbes(self.volume, self.start, self.settings, self.seed, both("rows"), placement, both("first"),
-                             both("second"), None if self.emitted is None else both("emitted"), both("distance"), both("weight"),
+                             both("second"), None if self.emitted is None else both("emitted"), both("light"),
+                             None if self.glow is None else both("glow"), both("distance"), both("weight"),
                              self.memory + other.memory)
 
 
@@ -118,8 +122,9 @@ def start_probes(context: LightContext, cache: SurfaceCache, settings: ProbeSett
     everywhere = Placement(*(np.zeros((len(where), *part.shape[1:]), part.dtype) for part in (
         placed.positions, placed.offset, placed.validity, placed.measured, placed.reach)))
     everywhere.positions[numbers], everywhere.reach[numbers] = placed.positions, placed.reach
-    gatherer, memory = Gatherer(context, cache, everywhere, settings, seed), HitMemory()
+    gatherer, memory = Gatherer(context, cache, everywhere, settings, seed, keeps_light=True), HitMemory()
     sums, emitted = np.zeros((2, count, k, 3)), None
+    light, glow = np.zeros((count, PROBE_RAYS, 3), np.float32), None
     distance, weight = np.zeros((count, tiles, 2), np.float32), np.zeros((count, tiles), np.float32)
     items = _items(numbers[placed.measured])
     for item, hits, texel, gathered in zip(items, *gather(gatherer, items, progress, "rays from probes"), strict=True):
@@ -128,10 +133,15 @@ def start_probes(context: LightContext, cache: SurfaceCache, settings: ProbeSett
         distance[own] += gathered.distance
         weight[own] += gathered.distance_weight
         memory.keep(item, hits, texel, gathered)
+        ray = where[item.probes][:, None, :], (item.first[:, None] + np.arange(item.count))[:, :, None]
+        light[ray] = gathered.along.light
         if gathered.emitted is not None:
             emitted = np.zeros((count, k, 3)) if emitted is None else emitted
             emitted[own] += gathered.emitted
-    return StartedProbes(volume, start, settings, seed, rows, placed, sums[0], sums[1], emitted, distance, weight, (memory,))
+            glow = np.zeros_like(light) if glow is None else glow
+            glow[ray] = gathered.along.emitted
+    return StartedProbes(volume, start, settings, seed, rows, placed, sums[0], sums[1], emitted, light, glow, distance, weight,
+                         (memory,))
 
 
 def _items(probes: np.ndarray) -> list[Item]:

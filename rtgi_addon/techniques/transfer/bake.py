@@ -22,9 +22,11 @@ from ..lamp_light import LampLight
 from ..lattice.coverage import require_open
 from ..lattice.dilation import dilate
 from ..lattice.placement import Placement, place
-from ..probes.bake import mean_distances, surface_cache
-from ..probes.gather import GROUP, RAYS_PER_LIGHT_SAMPLE, Gatherer, Item
+from ..probes.bake import surface_cache
+from ..probes.distances import mean_distances
+from ..probes.gather import GROUP, RAYS_PER_LIGHT_SAMPLE, Gatherer
 from ..probes.item_rays import ITEM_RAYS
+from ..probes.items import Item
 from .columns import LightColumn
 from .data import TransferGrid
 from .halves import early_light, standard_error

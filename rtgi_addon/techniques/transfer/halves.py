@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..probes.gather import RAYS_PER_LIGHT_SAMPLE, Gatherer, Item, Traced
+from ..probes.gather import RAYS_PER_LIGHT_SAMPLE, Gatherer, Traced
 from ..probes.gathering import HALVES
+from ..probes.items import Item
 
 
 def early_light(gatherers: list[Gatherer], item: Item, traced: Traced, texel: np.ndarray | None) -> np.ndarray | float:

@@ -13,7 +13,8 @@ from ...numerics import sh
 from ...transport.cache.columns import leaving_columns
 from ...transport.cache.surface_cache import SurfaceCache
 from ...transport.parallel import CHUNK, chunks
-from ..probes.gather import Gatherer, Item, Traced
+from ..probes.gather import Gatherer, Traced
+from ..probes.items import Item
 
 # Columns that are gathered together. OpenBLAS starts threads of its own for products of 2^18 multiplications or more, which under
 # our threads only wait for each other.

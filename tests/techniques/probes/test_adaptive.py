@@ -80,6 +80,7 @@ def test_probes_in_the_dark_make_no_room_for_the_error_of_others():
     alone = made.rays_needed(every, every // GROUP, 1e-4, 1 << 15).sum()
     dark = ErrorModel(2 * len(truth), 1, brightness=float(np.sqrt(3.0 * np.mean(truth**2))))
     dark.restore({"total": np.concatenate([made.total, 0.0 * made.total]), "rays": np.tile(made.rays, 2),
+                  "turned": np.tile(made.turned, 2),
                   "pairs": made.state()["pairs"], "squares": np.concatenate([made.state()["squares"]] * 2, axis=1) * np.repeat(
                       [1.0, 0.0], len(truth))})
     both = np.arange(2 * len(truth))

@@ -19,7 +19,8 @@ from ....transport.parallel import chunks
 from ....transport.paths.direct import choose_among
 from ....transport.paths.sources import Sources
 from ...lattice.field import ProbeField
-from ..gather import Gathered, Gatherer, Item
+from ..gather import Gathered, Gatherer
+from ..items import Item
 from ..settings import ProbeSettings
 
 # Hits and sources that are weighed against each other at a time.

@@ -23,8 +23,9 @@ from ...base import ProbeGrid
 from ...lamp_light import LampLight
 from ...lattice.placement import Placement, place, place_points
 from ...lattice.unseen import wanted_probes
-from ..bake import mean_distances
-from ..gather import GROUP, Item
+from ..distances import mean_distances
+from ..gather import GROUP
+from ..items import Item
 from ..settings import ProbeSettings
 from .settings import LiveSettings
 
