@@ -134,8 +134,8 @@ def plan_scene(scene: Scene, target: Target, *, seed: int = 0, threads: int | No
 def bake_planned(scene: Scene, target: Target, out, *, seed: int = 0, threads: int | None = None, volume=None,
                  motion: Motion | None = None, check: bool = True, direct: bool = False, fit: bool = False,
                  keep: Callable[[Field], None] | None = None, progress: Progress | None = None, **options) -> PlannedBake:
-    """Plan, bake into ``out`` as planned, and ``check`` the result at receivers that were held back. With ``fit`` probes that are
-    planned as they are measured are then fitted to surfaces, so that the plan's error is what they had without.
+    """Plan, bake into ``out`` as planned, and ``check`` the result at receivers that were held back. With ``fit`` probes are
+    fitted to surfaces, and planned so.
 
     ``keep`` and ``options`` go to bake_scene. The plan is in the bundle's notes. Raises as bake_scene does.
     """
@@ -149,12 +149,13 @@ def bake_planned(scene: Scene, target: Target, out, *, seed: int = 0, threads: i
     kept: list[Field] = []
     # Nobody else takes the place while the plan is made.
     with workplace(check_target(out, inputs=scene.files), "bake") as place:
-        plan = plan_scene(scene, target, seed=seed, threads=threads, volume=volume, motion=motion, others=False,
-                          progress=progress.span(0.0, PLANNED_AT)).plan
+        plan = plan_scene(scene, replace(target, fit=target.fit or fit), seed=seed, threads=threads, volume=volume, motion=motion,
+                          others=False, progress=progress.span(0.0, PLANNED_AT)).plan
         settings = {**plan.settings, **({"direct": True} if direct else {})}
         if fit and plan.technique != FITTING:
             raise UsageError(f"the plan is {plan.technique}, which has nothing to fit", "leave out --fit")
         if fit:
+            # Nested volumes are planned as they are measured.
             settings["fit"] = True
         with count_rays() as counter:
             names = None if volume is None else [one.name for one in plan.volumes]
@@ -167,8 +168,12 @@ def bake_planned(scene: Scene, target: Target, out, *, seed: int = 0, threads: i
     if check:
         progress.stage("verify")
         # Of the rays, as of the seconds, those of a fit and of sphere probes were not predicted.
-        rays = counter.rays - sum(made["rays"] for made in kept[0].stats.get("fits", ())) - summary.stats.get("spheres_traced", 0)
-        found = check_plan(plan, scene, kept[0], summary.seconds, rays, threads, progress.span(BAKED_AT, 1.0))
+        rays = counter.rays - sum(one["rays"] for one in kept[0].stats.get("fits", ())) - summary.stats.get("spheres_traced", 0)
+        made, seconds = plan.found.finished, summary.seconds
+        if made is not None and kept[0] is made.field:
+            # The bake was made to plan it.
+            rays, seconds = rays + made.rays, {**seconds, "in the plan": made.seconds}
+        found = check_plan(plan, scene, kept[0], seconds, rays, threads, progress.span(BAKED_AT, 1.0))
         summary = replace(summary, seconds=progress.finish())
     return PlannedBake(plan, summary, found)
 

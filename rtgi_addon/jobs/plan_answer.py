@@ -20,7 +20,7 @@ def answer(plan: Plan) -> tuple[str, str, str]:
 
 def what(plan: Plan) -> str:
     """Technique, settings and lattices."""
-    settings = ", ".join(f"{name} {value:g}" for name, value in plan.settings.items())
+    settings = ", ".join(name if value is True else f"{name} {value:g}" for name, value in plan.settings.items())
     lattices = ", ".join(f"{volume.name} {size([volume.resolution])}" for volume in plan.volumes)
     return f"{plan.technique} with {settings} on {lattices}: {plan.probes:,} probes"
 

@@ -99,7 +99,8 @@ def test_direct_light_cannot_be_checked(tmp_path):
 
 def test_a_planned_bake_can_be_fitted(tmp_path):
     done = bake_planned(room(resolution=(3, 3, 3)), Target(0.3), tmp_path / "bundle", fit=True, check=False, threads=1)
-    assert "fit" not in done.plan.settings and done.bake.settings["fit"] and len(done.bake.stats["fits"]) == 1
+    assert done.plan.settings["fit"] and done.bake.settings["fit"] and len(done.bake.stats["fits"]) == 1
+    assert any(reason.startswith("Fitted to surfaces") for reason in done.plan.reasons) and ", fit on " in done.to_text()
 
 
 def test_what_is_beside_a_plan_is_told():

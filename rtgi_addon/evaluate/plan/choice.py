@@ -17,6 +17,7 @@ from ...transport.context import LightContext
 from ...transport.rays.ray_counter import count_rays
 from ..metrics import Figure
 from .alternatives import LOOSE, Measured, measure_others
+from .fitted import fit_lattice
 from .look import Look, Motion, look_at
 from .nesting import FEWEST_PROBES, nest
 from .pictures import PictureLook, look_at_picture
@@ -56,7 +57,7 @@ class Target:
     reads them; ``memory`` bytes that the bake may take (None: any); ``probes`` that the lattices may have together. ``orders`` are
     the SH orders to choose from; ``keep_air`` keeps probes that no surface reads, for things that move through the air;
     ``nested`` has finer volumes looked for within coarser ones whatever that takes, which is done anyway where it takes little of
-    the bake."""
+    the bake; ``fit`` has probes fitted to surfaces, on as coarse a lattice as that allows."""
 
     error: float = 0.05
     memory: float | None = None
@@ -64,6 +65,7 @@ class Target:
     orders: tuple[int, ...] = (1, 2)
     keep_air: bool = False
     nested: bool = False
+    fit: bool = False
 
     def __post_init__(self):
         low, high = ERROR_RANGE
@@ -160,14 +162,21 @@ def make_plan(scene: Scene, target: Target, *, seed: int = 0, threads: int | Non
         large = found.reading.lattice_points >= FEWEST_PROBES
         found = nest(pilot, found, target.error, lambda volumes, order: _limit(prices, target, volumes, order),
                      lambda rays: target.nested or (large and search.may_spend(rays, found)), searched.span(_SINGLE, 1.0))
+        keep_air = target.keep_air or bool(look.motion.objects)
+        if target.fit and len(found.reading.volumes) == len(scene.volumes):
+            found = fit_lattice(pilot, found, target.error,
+                                lambda reading: _volumes(context, reading, sample, scene.volumes, keep_air),
+                                progress.span(_FOUND, _FOUND_ALONE))
         names = [name for name in techniques.names() if name != "probes"] if others or target.error > LOOSE else []
         measured = measure_others(pilot, names, seed, progress.span(_FOUND, _FOUND_ALONE))
         picture = look_at_picture(scene, threads, progress.span(_FOUND_ALONE, 1.0)) if others else None
-        volumes = _volumes(context, found.reading, sample, scene.volumes, target.keep_air or bool(look.motion.objects))
+        volumes = _volumes(context, found.reading, sample, scene.volumes, keep_air)
     kept = sum(int(np.prod(volume.resolution)) if volume.wanted is None else int(volume.wanted.sum()) for volume in volumes)
     options = _options(pilot, prices, found, measured, target, kept, others)
     chosen = options[0]
     settings = {"order": found.order, "error": found.ray_error} if chosen.technique == "probes" else {"order": found.order}
+    if found.fitted and chosen.technique == "probes":
+        settings["fit"] = True
     progress.step(1.0, "planned")
     return Plan(target, chosen.technique, settings, volumes, chosen.meets, options,
                 tuple(reasons(look, found, chosen, scene.volumes, volumes, target, kept)), look, found, sample,
@@ -213,12 +222,15 @@ def _options(pilot: Pilot, prices: Prices, found: Found, measured: list[Measured
     """What is planned first, then what else there is: other orders, rays and lattices of probes only if ``all_of_them`` are
     wanted."""
     def probes(reading, order, ray_error, label, share=None):
-        error = reading.error(order, ray_error)
+        error = found.error if label == "planned" else reading.error(order, ray_error)
         return Option("probes", label, reading.resolutions, error, prices.price(reading, order, ray_error, share),
                       upper(error) <= target.error)
 
     chosen = probes(found.reading, found.order, found.ray_error, "planned", kept)
     rest, planned = [], found.reading
+    if found.fitted:
+        rest.append(probes(found.measured, found.order, found.ray_error, "not fitted"))
+        all_of_them = False
     for order in pilot.orders if all_of_them else ():
         if order != found.order:
             rest.append(probes(planned, order, found.ray_error, f"order {order}", kept))

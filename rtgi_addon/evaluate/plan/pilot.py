@@ -23,7 +23,7 @@ from ...techniques.probes.distances import mean_distances
 from ...techniques.probes.gather import GROUP
 from ...techniques.probes.gathering import HALVES, light_at_receivers
 from ...techniques.probes.settings import ProbeSettings
-from ...techniques.probes.started import HALF_RAYS, PROBE_RAYS, StartedProbes, lattice_key, rounded_out, start_probes
+from ...techniques.probes.started import HALF_RAYS, PROBE_RAYS, Finished, StartedProbes, lattice_key, rounded_out, start_probes
 from ...transport.context import LightContext
 from ...transport.rays.ray_counter import count_rays
 from ..metrics import Figure
@@ -155,7 +155,9 @@ class Pilot:
         self.receiver_rays = int(np.clip(RECEIVER_RAYS * 2.0 ** round(2.0 * np.log2(USUAL_TARGET / target)), *RECEIVER_RANGE))
         self._known: dict[tuple, Reading] = {}
         self._started: dict[tuple, StartedProbes] = {}  # by lattice
-        self._bake_seed = seed_of(np.random.default_rng(seed))
+        # A bake that was made to see how good it is, and is the one that is planned.
+        self.finished: Finished | None = None
+        self.bake_seed = seed_of(np.random.default_rng(seed))
         self._probes = 0
         self.truth, self.truth_effort = Truth(*np.zeros((2, 0, 3))), Effort(0, 0.0)
         self._trace_truth(self.points(0), progress)
@@ -168,7 +170,7 @@ class Pilot:
     @property
     def begun(self) -> Begun:
         """What a bake of the same scene with the same seed need not do again."""
-        return Begun(self.context, self.cache, self.settings.target, tuple(self._started.values()))
+        return Begun(self.context, self.cache, self.settings.target, tuple(self._started.values()), self.finished)
 
     @property
     def spent(self) -> int:
@@ -194,6 +196,11 @@ class Pilot:
         if key not in self._known:
             self._known[key] = self._measured(volumes, self.sample.receivers.take(slice(0, points * NORMALS_PER_POINT)), progress)
         return self._known[key]
+
+    @property
+    def seed(self) -> int:
+        """That of all it draws, and of the bake that it prepares."""
+        return self._seed
 
     def _trace_truth(self, points: int, progress: Progress) -> None:
         """Have the irradiance at the receivers of the first ``points`` points."""
@@ -238,7 +245,7 @@ class Pilot:
                 continue
             done = _PLACED + (_GATHERED - _PLACED) * np.searchsorted(owner, [number, number + 1]) / len(owner)
             start = int(starts[number]) if old is None else old.start
-            new = start_probes(self.context, self.cache, self.settings, volume, start, self._bake_seed, rows[number],
+            new = start_probes(self.context, self.cache, self.settings, volume, start, self.bake_seed, rows[number],
                                placed.take(own), progress.span(*done))
             known[number] = self._started[lattice_key(volume)] = new if old is None else old.joined(new)
         return known

@@ -26,6 +26,7 @@ def reasons(look: Look, found: Found, chosen, files: tuple[ProbeVolume, ...], vo
     lines.append(_climb(found))
     lines += _lattices(files, [volume for volume in volumes if not volume.planned], found.single is not None)
     lines += _nesting(found, volumes)
+    lines += _fit(found)
     lines.append(_verdict(found, chosen, target))
     if not chosen.meets:
         lines.append(_worst(found))
@@ -86,6 +87,17 @@ def _nesting(found: Found, volumes) -> list[str]:
     if found.single is not None:
         lines.append(f"Nested so, {found.reading.lattice_points:,} probes do what takes {found.single.lattice_points:,} without.")
     return lines
+
+
+def _fit(found: Found) -> list[str]:
+    if not found.fitted:
+        return []
+    probes, other = found.reading.lattice_points, found.measured.lattice_points
+    if probes < other:
+        return [f"Fitted to surfaces, {probes:,} probes do what takes {other:,} as they are measured: a bake of them was held to "
+                "points that its fit did not see."]
+    return ["Fitted to surfaces, no coarser lattice that was tried does: a bake of each was held to points that its fit did not "
+            "see."]
 
 
 def _verdict(found: Found, chosen, target) -> str:

@@ -17,6 +17,7 @@ import numpy as np
 from ...errors import BakeError
 from ...progress import Progress
 from ...scene import ProbeVolume
+from ...techniques.probes.started import Finished
 from ..metrics import Figure
 from .pilot import CACHE_SHARE, PILOT_ERROR, Pilot, Reading
 from .price import Prices
@@ -54,8 +55,9 @@ class Found:
     """A lattice (``reading``) with SH of ``order`` and rays until the target ``ray_error``; ``error`` is predicted; ``met`` tells
     whether the target is met with CONFIDENCE. ``rate`` is the exponent p of error ~ spacing^p over the last doubling, and ``climb``
     the doublings that were measured; ``limited`` names what kept the lattice from becoming finer, if anything did.
-    ``nesting`` is "nested" where finer volumes lie in coarser ones, in place of the lattices ``single``, and "spread" where that
-    was tried and saves too little."""
+    With ``fitted`` the error is that of probes fitted to surfaces, by the bake that was ``finished``, and ``measured`` the lattice
+    that would do without. ``nesting`` is "nested" where finer volumes lie in coarser ones, in place of the lattices ``single``, and
+    "spread" where that was tried and saves too little."""
 
     reading: Reading
     order: int
@@ -67,6 +69,9 @@ class Found:
     limited: str = ""
     nesting: str = ""
     single: Reading | None = None
+    fitted: bool = False
+    finished: Finished | None = None
+    measured: Reading | None = None
 
 
 class Search:

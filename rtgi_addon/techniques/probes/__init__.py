@@ -52,6 +52,8 @@ class Probes(Technique):
              threads: int | None = None, checkpoint: Checkpoint | None = None, begun: Begun | None = None) -> Field:
         """See Technique.bake. ``begun`` is what other work on this very scene has done of it already; the volumes may differ."""
         context, seed = begin_bake(scene, settings, rng, progress, threads, begun.context if begun else None)
+        if begun is not None and begun.finished is not None and begun.finished.is_of(scene.volumes, settings, seed):
+            return begun.finished.field
         bakes, start, probes = [], 0, sum(int(np.prod(volume.resolution)) for volume in scene.volumes)
         for number, (group_settings, volumes) in enumerate(volumes_by_settings(scene.volumes, settings)):
             count = sum(int(np.prod(volume.resolution)) for volume in volumes)

@@ -33,7 +33,7 @@ from .relight import MAX_KEPT_RAYS, HitMemory
 from .settings import ProbeSettings
 from .shares import TEXEL_COST, Shares
 from .spreading import Spreading
-from .started import HALF_RAYS, StartedProbes, that_fit
+from .started import HALF_RAYS, Finished, StartedProbes, that_fit
 from .strata import CELLS, REFINED, Spread
 
 # Rays of all the items that are held in memory between tracing and shading.
@@ -62,12 +62,13 @@ PLACED, TRACED = 0.02, 0.97
 @dataclass(frozen=True, eq=False)
 class Begun:
     """What other work on a scene has done of its bake: its ``context``, a surface ``cache`` made for the target ``error``, and the
-    first rays of the probes that were ``started`` with that cache."""
+    first rays of the probes that were ``started`` with that cache; or one that was ``finished``."""
 
     context: LightContext
     cache: SurfaceCache
     error: float
     started: tuple[StartedProbes, ...] = ()
+    finished: Finished | None = None
 
     def serves(self, context: LightContext, volumes: tuple[ProbeVolume, ...], settings: ProbeSettings) -> bool:
         """Whether a bake of ``volumes`` in ``context`` with ``settings`` may go on with the cache: texels may be larger than its

@@ -13,6 +13,7 @@ from ...progress import Progress
 from ...scene import ProbeVolume
 from ...transport.cache.surface_cache import SurfaceCache
 from ...transport.context import LightContext
+from ..base import Field
 from ..lattice.placement import Placement
 from .adaptive import FIRST_ROUND
 from .gather import GROUP, Gatherer, gather
@@ -74,6 +75,26 @@ class StartedProbes:
                              both("second"), None if self.emitted is None else both("emitted"), both("light"),
                              None if self.glow is None else both("glow"), both("distance"), both("weight"),
                              self.memory + other.memory)
+
+
+@dataclass(frozen=True, eq=False)
+class Finished:
+    """A bake of ``volumes`` with ``settings`` and ``seed`` that was made to see how good it is: its ``field``, and what it took
+    without its fit (``seconds``) and with it (``rays``)."""
+
+    volumes: tuple[ProbeVolume, ...]
+    settings: ProbeSettings
+    seed: int
+    field: Field
+    seconds: float
+    rays: int
+
+    def is_of(self, volumes: tuple[ProbeVolume, ...], settings: ProbeSettings, seed: int) -> bool:
+        """Whether it is the bake of ``volumes`` with ``settings`` and ``seed``."""
+        return (self.settings, self.seed, len(self.volumes)) == (settings, seed, len(volumes)) and all(
+            (mine.name, mine.settings, mine.planned, *lattice_key(mine)) == (its.name, its.settings, its.planned, *lattice_key(its))
+            and its.scattered is None and its.near == mine.near and np.array_equal(mine.wanted, its.wanted)
+            for mine, its in zip(self.volumes, volumes, strict=True))
 
 
 def that_fit(all_started: Sequence[StartedProbes], volumes: tuple[ProbeVolume, ...], settings: ProbeSettings,

@@ -48,6 +48,13 @@ PLANS: dict[str, str] = {
     "{0}, {1} probes within {2}, lies where most of the error was.":
         "{0}, {1} Sonden in {2}, liegt, wo der größte Teil des Fehlers war.",
     "Nested so, {0} probes do what takes {1} without.": "So ineinander leisten {0} Sonden, wozu es ohne das {1} braucht.",
+    "Fitted to surfaces, {0} probes do what takes {1} as they are measured: a bake of them was held to points that its fit did not "
+    "see.":
+        "An Flächen angepasst leisten {0} Sonden, wozu es gemessen {1} braucht: was damit gebacken wurde, ist an Punkten geprüft, "
+        "die die Anpassung nicht sah.",
+    "Fitted to surfaces, no coarser lattice that was tried does: a bake of each was held to points that its fit did not see.":
+        "An Flächen angepasst reicht kein gröberes Gitter, das versucht wurde: jedes wurde gebacken und an Punkten geprüft, die "
+        "seine Anpassung nicht sah.",
     "the volume {0} is no longer there": "das Volumen {0} ist nicht mehr da",
     "plan again": "neu planen",
     "coarser, since light is smooth there": "gröber, denn dort ist Licht gleichmäßig",
