@@ -18,19 +18,22 @@ from ..frame import Frame
 # Taps of every pass, as many pixels apart as its step.
 _KERNEL = np.float32([0.25, 0.5, 0.25])
 _STEPS = 1, 2, 4
+# One of every two opposite neighbours, and by how much one counts whose opposite is not like the pixel: only where nothing else is
+# known. A pixel at an edge that took from one side alone would have that side's light, however evenly light changes.
+_HALF, _ALONE = ((0, 1), (1, -1), (1, 0), (1, 1)), np.float32(1e-3)
 # Ward's a: how far light may come along, as a share of the harmonic mean distance, in the first sample; and samples after which it
 # is half of that.
 _SHARE, _HALVED = 0.25, 32.0
-# Normals that differ by 8° share half, as surfaces do that lie off the plane by half a pixel's width.
-_NORMAL_POWER = 72.0
+# Normals that differ by 8° share half, by the 72nd power of their cosine, as surfaces do that lie off the plane by half a pixel's
+# width. What counts by less than two to this power does not.
+_LEAST_EXPONENT = -64.0
 _TINY = np.float32(1e-20)
 
 
 class _Places(NamedTuple):
     """What pixels show, each part in planes (h, w), or (n,) of single pixels: ``points`` and ``normals`` by their components,
     one over a pixel's width there [m], and where anything is ``seen``.
-    ``pairs`` tells which have a neighbour so far down and along, and
-    which these are."""
+    ``pairs`` tells which have a neighbour so far down and along, and which these are."""
 
     points: tuple[np.ndarray, ...]
     normals: tuple[np.ndarray, ...]
@@ -73,28 +76,44 @@ def _planes(target: np.ndarray) -> tuple[np.ndarray, ...]:
 def _pass(places: _Places, values: np.ndarray, weight: np.ndarray, step: int,
           reach: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
     """``values`` (..., c) that count by ``weight`` (...), averaged over taps ``step`` pixels apart; ``reach`` (...) [m]."""
-    points, normals, inverse_width, seen, pairs = places
     channels = [np.ascontiguousarray(values[..., channel]) for channel in range(values.shape[-1])]
-    totals, weights = [np.zeros_like(channel) for channel in channels], np.zeros_like(weight)
-    for j, down in enumerate(_KERNEL):
-        for i, along in enumerate(_KERNEL):
-            here, there = pairs((j - 1) * step, (i - 1) * step)
-            if j == i == 1:
-                counts = weight * (down * along)
-            else:
-                apart = [part[there] - part[here] for part in points]
-                alike = sum(part[here] * part[there] for part in normals)
-                off = sum(part[here] * way for part, way in zip(normals, apart, strict=True)) * inverse_width[here]
-                exponent = np.float32(_NORMAL_POWER) * np.log2(np.maximum(alike, _TINY)) - 4.0 * off * off
-                if reach is not None:
-                    near = np.minimum(reach[here], reach[there])
-                    exponent -= sum(way * way for way in apart) / np.maximum(near * near, _TINY)
-                counts = np.exp2(exponent) * weight[there] * (down * along)
+    own = _KERNEL[1] * _KERNEL[1]
+    totals, weights, most = [channel * (weight * own) for channel in channels], weight * own, np.full_like(weight, own)
+    for down, along in _HALF:
+        ways = [(sign * down * step, sign * along * step) for sign in (1, -1)]
+        likeness = [_likeness(places, *way, reach) for way in ways]
+        both = np.minimum(*likeness)
+        for way, alike in zip(ways, likeness, strict=True):
+            here, there = places.pairs(*way)
+            counts = (both[here] + _ALONE * alike[here]) * (_KERNEL[1 + down] * _KERNEL[1 + along])
+            most[here] += counts
+            counts *= weight[there]
             for total, channel in zip(totals, channels, strict=True):
                 total[here] += channel[there] * counts
             weights[here] += counts
     found = np.stack(totals, axis=-1) / np.maximum(weights, _TINY)[..., None]
-    return found, np.where(seen, weights, np.float32(0.0))
+    # A share, not a sum: pixels at edges, which take from few, would count less in the passes that follow than their opposites.
+    return found, np.where(places.seen, weights / most, np.float32(0.0))
+
+
+def _likeness(places: _Places, down: int, along: int, reach: np.ndarray | None) -> np.ndarray:
+    """How much (...) light counts that comes to every pixel from the one so far ``down`` and ``along``, in [0, 1]."""
+    points, normals, inverse_width, _, pairs = places
+    here, there = pairs(down, along)
+    apart = [part[there] - part[here] for part in points]
+    alike = np.maximum(sum(part[here] * part[there] for part in normals), np.float32(0.0))
+    for _ in range(3):
+        alike = alike * alike
+    # To the power of 72.
+    alike = np.square(np.square(np.square(alike))) * alike
+    off = sum(part[here] * way for part, way in zip(normals, apart, strict=True)) * inverse_width[here]
+    exponent = np.float32(-4.0) * off * off
+    if reach is not None:
+        near = np.minimum(reach[here], reach[there])
+        exponent -= sum(way * way for way in apart) / np.maximum(near * near, _TINY)
+    result = np.zeros_like(inverse_width)
+    result[here] = np.where(exponent > _LEAST_EXPONENT, alike * np.exp2(exponent), np.float32(0.0))
+    return result
 
 
 def _overlap(shape: tuple[int, int]) -> Callable[[int, int], tuple]:
