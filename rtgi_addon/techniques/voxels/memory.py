@@ -12,7 +12,7 @@ from .settings import VoxelSettings
 
 # Of a place where a line meets a surface, of a cell of the grid, of one whose light is swept, and of a thread that gathers:
 # measured as in scene/memory.py.
-BYTES_PER_LINE, BYTES_PER_CELL, BYTES_PER_SWEPT, BYTES_PER_GATHERING = 90, 45, 360, 4 << 20
+BYTES_PER_LINE, BYTES_PER_CELL, BYTES_PER_SWEPT, BYTES_PER_GATHERING = 90, 45, 420, 4 << 20
 
 
 def require_voxels(context: LightContext, grids: tuple[VoxelGrid, ...], settings: VoxelSettings) -> None:
