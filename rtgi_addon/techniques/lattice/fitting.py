@@ -91,15 +91,12 @@ class Fit:
                        for kind in range(len(kinds))]
 
     def _find(self, measured: Stored) -> None:
-        # Coefficients alone, then distances and all, then coefficients once more: their price is found anew each time.
+        # Coefficients alone, at the price that is found for them; then distances, with coefficients at the least price.
         self._progress.step(0.0, LABEL)
         self._asked.balance(measured)
-        found = self._priced(measured, measured, PRICES)
-        if not self._distances:
-            return
-        self._move(measured, found, PRICES[-1])
-        if self.stored.mean is not measured.mean:
-            self._priced(measured, self.stored, [price for price in PRICES if price != self.price])
+        found = self._priced(measured)
+        if self._distances:
+            self._move(measured, found, PRICES[-1])
 
     def _try(self, found: Stored, price: float, weighed=None) -> bool:
         """Whether ``found`` is the best so far at the held points: then it is kept."""
@@ -118,11 +115,11 @@ class Fit:
         left, before = (np.bincount(self._judge.kind, part) for part in (squares, self._before))
         return float(np.mean(left / np.maximum(before, np.finfo(np.float64).tiny)))
 
-    def _priced(self, measured: Stored, at: Stored, prices) -> Stored:
-        """Coefficients at the distances of ``at`` for each of the ``prices``, tried; the last of them."""
-        problem, held = _Problem(self._asked, measured, self._scale(measured)), self._judge.weigh(at)
-        equations, found = self._asked.equations(self._asked.weigh(at)), at
-        for price in prices:
+    def _priced(self, measured: Stored) -> Stored:
+        """Coefficients at the distances that were ``measured`` for each of the PRICES, tried; the last of them."""
+        problem, held = _Problem(self._asked, measured, self._scale(measured)), self._judge.weigh(measured)
+        equations, found = self._asked.equations(self._asked.weigh(measured)), measured
+        for price in PRICES:
             self._progress.check()
             found = problem.solved(equations, found, price / self._count)[0]
             self._try(found, price, held)
