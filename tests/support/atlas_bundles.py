@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from transfer_bundles import transfer_bundle
+from transfer_bundles import transfer_bundle, uneven_bundle
 
 from rtgi_addon.effects.atlas.matrices import NUMBERS, AtlasTransfer
 from rtgi_addon.effects.atlas.sheet import LightAtlas
@@ -25,8 +25,9 @@ def light_atlas():
     return LightAtlas(Sheet(parts, (24, 32)), coefficients, np.abs(coefficients[:, :, 0]) * 0.9, known)
 
 
-def relit_atlas_bundle():
-    """The kit's probes with their transfer, and a light atlas that knows it too."""
+def relit_atlas_bundle(uneven=False):
+    """The kit's probes with their transfer, and a light atlas that knows it too; of lights that are ``uneven``, some texels get
+    10,000 times as much as others."""
     transfer, rng, sheet = kit_transfer(), np.random.default_rng(9), light_atlas()
     size = (*sheet.sheet.size, NUMBERS)
 
@@ -35,7 +36,10 @@ def relit_atlas_bundle():
 
     of_texels = AtlasTransfer(2, 4, False, matrices(*size, 9), matrices(3, *size, 9), matrices(3, *size, 16), matrices(*size, 16),
                               matrices(3, *size, len(transfer.lights)))
-    return replace(transfer_bundle(), atlas=replace(sheet, transfer=of_texels))
+    if uneven:
+        brighter = 10.0 ** rng.uniform(0.0, 4.0, (*size[:2], 1, 1)).astype(np.float32)
+        of_texels = replace(of_texels, lights=of_texels.lights * brighter)
+    return replace(uneven_bundle() if uneven else transfer_bundle(), atlas=replace(sheet, transfer=of_texels))
 
 
 def atlas_bundle():

@@ -22,6 +22,7 @@ from ...techniques.transfer.relight import light_factors
 from .atlas import EngineAtlas, answers, asked_of, kit_atlas
 from .axes import Axes
 from .conformance import BUNDLE, KIT
+from .transfer import half_scales
 from .transfer_conformance import kit_transfer, light_json, lightings
 
 SCHEMA = "rtgi-atlas-relight-conformance/1"
@@ -36,8 +37,8 @@ _KIT_SIDE = 3
 
 @dataclass(frozen=True, eq=False)
 class EngineAtlasTransfer:
-    """``tables`` (C, PARTS, height, width, COUNT) float16 along an engine's ``axes``, of which column c's colours are stored over
-    ``scales`` (C,). Columns are ``lights`` ((name, kind) each), ``sky_count`` harmonics of the sky, then the suns of a dome of
+    """``tables`` (C, PARTS, height, width, COUNT) float16 along an engine's ``axes``, of which column c is stored over ``scales``
+    (C,). Columns are ``lights`` ((name, kind) each), ``sky_count`` harmonics of the sky, then the suns of a dome of
     ``sun_side`` nodes a side (0: none; numerics/dome.py, in Blender's axes), twice as many with ``sun_below``."""
 
     axes: Axes
@@ -64,7 +65,7 @@ class EngineAtlasTransfer:
         light, seen = self._shining(transfer, lighting, sky)
         tables = self.tables.astype(np.float64)
         total = np.einsum("cphwk,cp->hwkp", tables[:, :3], light * self.scales[:, None])
-        return total + np.einsum("chwk,cp->hwkp", tables[:, 3], seen)
+        return total + np.einsum("chwk,cp->hwkp", tables[:, 3], seen * self.scales[:, None])
 
     def _shining(self, transfer: Transfer, lighting: Lighting, sky: Sky | None) -> tuple[np.ndarray, np.ndarray]:
         """What (C, 3) each column is multiplied by, and what (C, 3) is seen of it as a sun."""
@@ -112,9 +113,8 @@ def _tables_of(matrices: AtlasTransfer, lights: tuple[tuple[str, str], ...], axe
     tables = np.zeros((columns, PARTS, *coloured.shape[2:]), np.float32)
     tables[:, :3], tables[first:, 3] = coloured, np.moveaxis(matrices.seen[:, :, :COUNT], -1, 0)
     tables = axes.harmonics(tables.reshape(-1, COUNT, 1)).reshape(tables.shape)
-    largest = np.abs(tables[:, :3]).max(axis=(1, 2, 3, 4), initial=0.0)
-    scales = np.where(largest > 0.0, largest, 1.0).astype(np.float32)
-    tables[:, :3] /= scales[:, None, None, None, None]
+    scales = half_scales(np.abs(tables).max(axis=(1, 2, 3, 4), initial=0.0))
+    tables /= scales[:, None, None, None, None]
     return EngineAtlasTransfer(axes, tables.astype(np.float16), scales, lights, matrices.sky.shape[-1], matrices.sun_side,
                                matrices.sun_below)
 

@@ -20,12 +20,15 @@ from .volumes import ORDER, export_order
 COEFFICIENTS = sh.coefficient_count(ORDER)
 # Nine coefficients of three colours, and what is seen of a sun: seven texels of four numbers.
 NUMBERS, TEXELS = 28, 7
+# The largest number of a column as it is stored: Godot's importer reads halves below 2^-14 as 0, which of columns whose largest is 1
+# loses what a lamp beside one probe gives to those far from it.
+_LARGEST = 2.0**15
 
 
 @dataclass(frozen=True, eq=False)
 class EngineTransfer:
     """Tables along an engine's axes: ``tables`` (C, p, 28) float16 of each volume, in the order of ``export_volumes``, red, green
-    and blue of each coefficient in turn, then how much of a sun is seen. Column c is stored over ``scales`` (C,). Columns are
+    and blue of each coefficient in turn, then how much of a sun is seen. Column c is all stored over ``scales`` (C,). Columns are
     ``lights`` ((name, kind) each), then ``sky_count`` harmonics of the sky, then the suns of a dome of ``sun_side`` nodes a side
     (numerics/dome.py, in Blender's axes), twice as many with ``sun_below``. ``source`` is what they were made of."""
 
@@ -56,11 +59,15 @@ def engine_transfer(bundle: Bundle, axes: Axes) -> EngineTransfer | None:
 def tables_of(transfer: Transfer, axes: Axes) -> EngineTransfer:
     """The tables of ``transfer`` along ``axes``."""
     columns = [_columns(transfer.grids[index], axes) for index in export_order([grid.grid.volume for grid in transfer.grids])]
-    largest = np.max([np.abs(part).max(axis=(1, 2), initial=0.0) for part, _ in columns], axis=0)
-    scales = np.where(largest > 0.0, largest, 1.0).astype(np.float32)
-    tables = tuple(_table(part, seen, scales) for part, seen in columns)
+    scales = half_scales(np.max([np.abs(part).max(axis=(1, 2), initial=0.0) for part in columns], axis=0))
+    tables = tuple(_table(part, scales) for part in columns)
     return EngineTransfer(transfer, tables, scales, transfer.lights, sh.coefficient_count(transfer.sky_order), transfer.sun_side,
                           transfer.sun_below)
+
+
+def half_scales(largest: np.ndarray) -> np.ndarray:
+    """What (C,) float32 to store columns over as halves whose ``largest`` magnitudes (C,) are known."""
+    return np.where(largest > 0.0, largest / _LARGEST, 1.0).astype(np.float32)
 
 
 def notes_on_transfer(transfer: EngineTransfer | None) -> list[str]:
@@ -90,13 +97,16 @@ def weights(transfer: Transfer, lighting: Lighting, sky: Sky | None) -> np.ndarr
     return np.concatenate([light_factors(transfer, lighting), harmonics, sun_shares(transfer, lighting, sky)])
 
 
-def _columns(grid: TransferGrid, axes: Axes) -> tuple[np.ndarray, np.ndarray]:
-    """(C, p, 27) float32 of one volume, and what is seen of suns (K, p)."""
+def _columns(grid: TransferGrid, axes: Axes) -> np.ndarray:
+    """(C, p, 28) float32 of one volume."""
     sky = grid.bounce + grid.sky[None]
     turned = axes.harmonics(np.eye(sky.shape[5])[:, :, None])[..., 0]
     sky = sky @ turned
     parts = [_coefficients(part, axes) for part in (grid.lights, sky, grid.suns)]
-    return np.concatenate(parts), grid.seen.reshape(-1, grid.seen.shape[3]).T
+    columns = np.concatenate(parts)
+    seen = np.zeros(columns.shape[:2], np.float32)
+    seen[len(columns) - grid.seen.shape[3]:] = grid.seen.reshape(-1, grid.seen.shape[3]).T
+    return np.concatenate([columns, seen[:, :, None]], axis=2)
 
 
 def _coefficients(matrices: np.ndarray, axes: Axes) -> np.ndarray:
@@ -107,8 +117,5 @@ def _coefficients(matrices: np.ndarray, axes: Axes) -> np.ndarray:
     return axes.harmonics(columns).reshape(*columns.shape[:2], -1)
 
 
-def _table(columns: np.ndarray, seen: np.ndarray, scales: np.ndarray) -> np.ndarray:
-    table = np.zeros((*columns.shape[:2], NUMBERS), np.float16)
-    table[..., :-1] = columns / scales[:, None, None]
-    table[len(columns) - len(seen):, :, -1] = seen
-    return table
+def _table(columns: np.ndarray, scales: np.ndarray) -> np.ndarray:
+    return (columns / scales[:, None, None]).astype(np.float16)

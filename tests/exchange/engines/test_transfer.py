@@ -5,10 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from transfer_bundles import transfer_bundle
+from atlas_bundles import relit_atlas_bundle
+from transfer_bundles import transfer_bundle, uneven_transfer
 
 from rtgi_addon.exchange import engines
 from rtgi_addon.exchange.engines import ExportSettings
+from rtgi_addon.exchange.engines.atlas import engine_atlas
+from rtgi_addon.exchange.engines.atlas_transfer import conformance_json, engine_atlas_transfer
 from rtgi_addon.exchange.engines.axes import UNREAL, Y_UP
 from rtgi_addon.exchange.engines.kit import kit_field
 from rtgi_addon.exchange.engines.transfer import NUMBERS, engine_transfer, tables_of, weights
@@ -16,7 +19,9 @@ from rtgi_addon.exchange.engines.transfer_conformance import kit_transfer, light
 from rtgi_addon.exchange.engines.volumes import export_volumes, held_field
 from rtgi_addon.exchange.exr import read_exr
 from rtgi_addon.numerics import sh
+from rtgi_addon.scene import World
 from rtgi_addon.techniques.lattice.lookup import LookupSettings
+from rtgi_addon.techniques.transfer.lighting import Lighting
 from rtgi_addon.techniques.transfer.relight import relit
 
 
@@ -34,10 +39,38 @@ def test_columns_times_light_are_what_relight_says(axes):
         for volume, table in zip(export_volumes(field, axes), tables.tables, strict=True):
             columns = table[..., :27].astype(np.float64).reshape(*table.shape[:2], 9, 3) * tables.scales[:, None, None, None]
             found = np.einsum("cpkx,cx->pkx", columns, light)
-            seen = table[tables.first_sun:, :, 27].astype(np.float64)
+            seen = (table[..., 27] * tables.scales[:, None].astype(np.float64))[tables.first_sun:]
             found += np.einsum("sp,sk,sx->pkx", seen, sh.evaluate(seen_from, 2), spikes)
             expected = volume.sh.reshape(-1, 9, 3)
             assert np.abs(found - expected).max() < 2e-3 * np.abs(expected).max(), name
+
+
+def as_imported(table):
+    """``table`` as Godot's importer leaves it, which reads halves below their full digits as 0."""
+    return np.where(np.abs(table) < np.finfo(np.float16).smallest_normal, np.float16(0.0), table)
+
+
+def test_probes_far_from_a_lamp_keep_their_digits():
+    transfer = uneven_transfer()
+    tables, night = tables_of(transfer, Y_UP), Lighting(World.constant(0.0), ())
+    column = [kind for _, kind in transfer.lights].index("group")
+    field = held_field(relit(transfer, night)).with_lookup(LookupSettings("linear"))
+    for volume, table in zip(export_volumes(field, Y_UP), tables.tables, strict=True):
+        expected = volume.sh.reshape(len(table[column]), -1)
+        found = as_imported(table)[column, :, :27] * tables.scales[column]
+        # Half a digit, and what turning axes costs in float32.
+        assert np.all(np.abs(found - expected) <= 2.0**-11 * np.abs(expected) + 1e-6 * np.abs(expected).max(axis=1, keepdims=True))
+
+
+def test_texels_far_from_a_lamp_are_within_the_kits_tolerance():
+    bundle, transfer = relit_atlas_bundle(uneven=True), uneven_transfer()
+    atlas = engine_atlas(bundle.atlas, Y_UP)
+    tables, _ = engine_atlas_transfer(atlas, transfer, Y_UP, 2048)
+    found = conformance_json(atlas, replace(tables, tables=as_imported(tables.tables)), transfer, Y_UP)["sets"][1]
+    expected = conformance_json(atlas, tables, transfer, Y_UP)["sets"][1]
+    for got, case in zip(found["cases"], expected["cases"], strict=True):
+        off = np.abs(np.subtract(got["irradiance"], case["irradiance"]))
+        assert np.max(off / case["tolerance"]) < 0.01, case["name"]
 
 
 def test_fewer_bands_are_zero_and_more_are_left_out():

@@ -11,7 +11,7 @@ from ..atlas import EngineAtlas, atlas_glsl
 from ..atlas_transfer import EngineAtlasTransfer, relight_glsl
 from ..base import write_text
 
-FORMAT = "rtgi-three-atlas/1"
+FORMAT = "rtgi-three-atlas/2"
 # UV maps that three.js reads of a mesh.
 TEXCOORDS = 4
 

@@ -15,7 +15,7 @@ from ..base import write_text
 from ..glsl import relight_glsl, shared_glsl
 from ..transfer import EngineTransfer
 
-FORMAT = "rtgi-three-transfer/1"
+FORMAT = "rtgi-three-transfer/2"
 
 
 def write_transfer_files(path: Path, transfer: EngineTransfer) -> None:

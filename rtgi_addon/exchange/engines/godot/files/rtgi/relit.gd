@@ -77,7 +77,7 @@ func entries(factors: Dictionary, new_suns: Variant, sky: Variant) -> PackedFloa
 		var seen := Vector3.ZERO
 		var towards := Vector3.UP
 		if sky != null and column >= first_sun:
-			seen = _vector(sky["suns"][column - first_sun])
+			seen = _vector(sky["suns"][column - first_sun]) * scales[column]
 			towards = suns[column - first_sun]
 		if light[column] != Vector3.ZERO or seen != Vector3.ZERO:
 			var scaled := light[column] * scales[column]

@@ -1,6 +1,6 @@
 import { IUniform, Mesh, Object3D, WebGLRenderer } from 'three';
 
-export const ATLAS_FORMAT: 'rtgi-three-atlas/1';
+export const ATLAS_FORMAT: 'rtgi-three-atlas/2';
 
 /** The light atlas of a .json and of the .bin beside it. */
 export function loadAtlas(url: string | URL): Promise<RTGIAtlas>;

@@ -12,7 +12,7 @@ import {
 } from 'three';
 import { DECLARED } from './shader.js';
 
-export const ATLAS_FORMAT = 'rtgi-three-atlas/1';
+export const ATLAS_FORMAT = 'rtgi-three-atlas/2';
 
 // Load the light atlas of an export.
 export async function loadAtlas(url) {

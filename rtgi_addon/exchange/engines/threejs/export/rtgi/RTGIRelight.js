@@ -15,7 +15,7 @@ import {
 import { COEFFICIENTS, COSINE_0, COSINE_1, COSINE_2, COSINE_2_ZONAL, harmonics } from './lookup.js';
 import { numbers, relit } from './relit.js';
 
-export const FORMAT = 'rtgi-three-transfer/1';
+export const FORMAT = 'rtgi-three-transfer/2';
 const NUMBERS = 28, TEXELS = 7;
 // Texels of an entry of what shines, see relit.js.
 const ENTRY = 3;
@@ -317,7 +317,7 @@ function entriesOf({ lights, scales, sky: skyCount, sunSide, sunBelow }, directi
   light.forEach((value, column) => {
     if (value.some((part) => part !== 0) || seen.has(column)) {
       const [sun, direction] = seen.get(column) ?? [[0, 0, 0], [0, 1, 0]];
-      rows.push(column, ...value.map((part) => part * scales[column]), ...sun, 0, ...direction, 0);
+      rows.push(column, ...[...value, ...sun].map((part) => part * scales[column]), 0, ...direction, 0);
     }
   });
   return Float32Array.from(rows);
