@@ -20,8 +20,8 @@ from .volumes import ORDER, export_order
 COEFFICIENTS = sh.coefficient_count(ORDER)
 # Nine coefficients of three colours, and what is seen of a sun: seven texels of four numbers.
 NUMBERS, TEXELS = 28, 7
-# The largest number of a column as it is stored: Godot's importer reads halves below 2^-14 as 0, which of columns whose largest is 1
-# loses what a lamp beside one probe gives to those far from it.
+# The largest number of a column as it is stored. Godot's importer reads halves below 2^-14 as 0: of columns whose largest is 1 that
+# would lose what a lamp beside one probe gives to those far from it.
 _LARGEST = 2.0**15
 
 
