@@ -19,5 +19,5 @@ def cached_scene(context: LightContext, frame: Frame) -> CachedScene:
             points = np.float32([frame.view.position])
         center = np.median(points, axis=0)
         radius = float(np.quantile(np.linalg.norm(points - center, axis=1), _FOCUS_SHARE))
-        context.kept[_KEPT] = CachedScene(context, center, max(radius, 1e-6))
+        context.kept[_KEPT] = CachedScene.about(context, center, max(radius, 1e-6))
     return context.kept[_KEPT]

@@ -8,6 +8,7 @@ from ...scene.lights import held_directly
 from ...techniques.base import Field
 from ...transport.cache.look import CachedScene, Looks
 from ...transport.context import LightContext
+from ...transport.lights.links import LightLinks
 from ...transport.parallel import chunks, parallel_for
 from ...transport.paths.direct import Receiver
 from ...transport.paths.numbers import LAMP, SCATTER, PathNumbers
@@ -30,14 +31,18 @@ _INSIDE = 0.5
 
 class TexelGather:
     """The rays of a light atlas from the ``places`` of its texels in the scene of ``context``; ``field`` and ``seed`` as
-    ``bake_atlas`` has them. ``texels`` (n,) are those that have places, ``rays`` counts the rays of all."""
+    ``bake_atlas`` has them. Surfaces are ``cached`` (None: anew), with ``links`` as ``CachedScene.about`` has them. ``texels`` (n,)
+    are those that have places, ``rays`` counts the rays of all."""
 
-    def __init__(self, context: LightContext, field: Field | None, settings: AtlasSettings, places: Places, seed: int):
+    def __init__(self, context: LightContext, field: Field | None, settings: AtlasSettings, places: Places, seed: int,
+                 links: LightLinks | None = None, cached: CachedScene | None = None):
         self.context, self._settings, self._places, self._seed = context, settings, places, seed
         self.texels, self._first, self._count = np.unique(places.texel, return_index=True, return_counts=True)
-        points = context.geometry.points(places.triangle, places.u, places.v)
-        middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-        self.cached = CachedScene(context, middle, float(np.linalg.norm(points - middle, axis=1).max()), seed)
+        if cached is None:
+            points = context.geometry.points(places.triangle, places.u, places.v)
+            middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+            cached = CachedScene.about(context, middle, float(np.linalg.norm(points - middle, axis=1).max()), seed, links)
+        self.cached = cached
         self._media = None if context.media.is_empty else MediaAlong(Surroundings.of(context.scene, context, field))
         lights = context.scene.lights
         held = {lights[number].name for number in held_directly(lights)} if field is None else field.direct_lamps
@@ -45,6 +50,21 @@ class TexelGather:
         self._sources = Sources(context)
         self.rays = len(self.texels) * settings.rays
         self._open = np.ones(len(places.texel), bool)
+
+    def under(self, context: LightContext, field: Field | None, progress: Progress) -> "TexelGather":
+        """The same rays under the light of another ``context`` of the same surfaces, those that are in use. Raises Cancelled."""
+        return TexelGather(context, field, self._settings, self._places, self._seed, cached=self.cached.under(context, progress))
+
+    def reach(self, progress: Progress) -> list[np.ndarray]:
+        """Bring into use what all rays meet, and tell the texel (h,) of every hit, for the ``chunks`` of all ``batches``. Raises
+        BakeError where there is not the memory for it, and Cancelled."""
+        texels, count = [], len(self.texels)
+        for batch in self.batches():
+            parts, span = self.chunks(batch), progress.span(batch.start / count, batch.stop / count)
+            looks = parallel_for(lambda i, parts=parts: self.trace(parts[i], self.rows(parts[i])), len(parts), self.context.threads,
+                                 span.span(0.0, 0.4), "Looking from the light atlas")
+            texels += self.cached.cache.reach([look.hits for look in looks], span.span(0.4, 1.0))
+        return texels
 
     def run(self, progress: Progress) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The texels (n,), which of them are known (n,) bool, and of each (n, 3·COUNT + 3) float32: coefficients, irradiance."""

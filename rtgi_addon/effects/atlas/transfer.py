@@ -10,7 +10,7 @@ import numpy as np
 
 from ...numerics import dome, sh
 from ...progress import Progress
-from ...scene import Scene, SunLight
+from ...scene import Scene, SunLight, baked_part
 from ...scene.memory import require_memory
 from ...techniques.base import Field
 from ...techniques.transfer.columns import dark_context, light_columns
@@ -18,6 +18,7 @@ from ...techniques.transfer.hits import radiance_of, small_products
 from ...transport.cache.columns import sky_columns, solve_columns, source_columns
 from ...transport.cache.look import TOLERANCE, Looks
 from ...transport.context import LightContext
+from ...transport.lights.links import LightLinks
 from ...transport.parallel import parallel_for
 from ...transport.rays.tracer import offset_origins
 from ...transport.vectors import dot
@@ -50,15 +51,16 @@ def bake_transfer(scene: Scene, field: Field, settings: AtlasSettings, places: P
     is not the memory, Cancelled."""
     transfer, dark = field.transfer, dark_context(scene, threads)
     side = settings.suns if settings.suns >= LEAST_SIDE else 0
-    gather, columns = TexelGather(dark, None, settings, places, seed), list(light_columns(scene, dark))
+    gather = TexelGather(dark, None, settings, places, seed, LightLinks(baked_part(scene)))
+    texels, columns = gather.reach(progress.span(0.0, 0.2)), list(light_columns(scene, dark))
     lights, rays = [], 2 * gather.rays
     for number, column in enumerate(columns):
-        part = progress.span(0.5 * number / len(columns), 0.5 * (number + 1) / len(columns))
-        _, _, light = TexelGather(column.context, field, settings, places, seed).run(part)
+        part = progress.span(0.2 + 0.3 * number / len(columns), 0.2 + 0.3 * (number + 1) / len(columns))
+        _, _, light = gather.under(column.context, field, part.span(0.0, 0.5)).run(part.span(0.5, 1.0))
         lights.append(light.reshape(len(light), NUMBERS, 3))
         rays += gather.rays
     towards = dome.directions(side, transfer.sun_below) if side else np.zeros((0, 3))
-    found = _Columns(gather, transfer.sky_order, towards, progress.span(0.5, 0.95)).run()
+    found = _Columns(gather, texels, transfer.sky_order, towards, progress.span(0.5, 0.95)).run()
     progress.step(0.95, "Joining the seams of the light atlas")
 
     def closed(values: np.ndarray) -> np.ndarray:
@@ -90,29 +92,25 @@ class _Found:
 
 
 class _Columns:
-    """Skies and suns ``towards`` (K, 3) at the texels of ``gather``, whose scene is dark: rays are traced twice, to find the texels
-    of the cache that they meet, and to weigh what those send."""
+    """Skies and suns ``towards`` (K, 3) at the texels of ``gather``, whose scene is dark and whose rays meet the ``texels`` of the
+    cache (``TexelGather.reach``): they are traced again, to weigh what those send."""
 
-    def __init__(self, gather: TexelGather, sky_order: int, towards: np.ndarray, progress: Progress):
-        self._gather, self._order, self._towards, self._progress = gather, sky_order, towards, progress
+    def __init__(self, gather: TexelGather, texels: list[np.ndarray], sky_order: int, towards: np.ndarray, progress: Progress):
+        self._gather, self._texels, self._order, self._towards, self._progress = gather, texels, sky_order, towards, progress
         self._context, self._cache = gather.context, gather.cached.cache
 
     def run(self) -> _Found:
         """All of it. Raises Cancelled."""
-        gather, context, progress, texels = self._gather, self._context, self._progress, []
+        gather, context, progress, texels = self._gather, self._context, self._progress, self._texels
         spans = [span for batch in gather.batches() for span in gather.chunks(batch)]
-        for batch in gather.batches():
-            parts = gather.chunks(batch)
-            looks = parallel_for(lambda i, parts=parts: gather.trace(parts[i], gather.rows(parts[i])), len(parts), context.threads)
-            texels += self._cache.reach([look.hits for look in looks], progress.span(0.0, 0.3))
         columns = sh.coefficient_count(self._order) + len(self._towards)
         require_memory({"columns": 3 * 12 * columns * self._cache.count, "atlas": 3 * 16 * NUMBERS * columns * len(gather.texels)})
-        sources = [sky_columns(self._cache, self._order, progress.span(0.3, 0.35))]
+        sources = [sky_columns(self._cache, self._order, progress.span(0.0, 0.05))]
         if len(self._towards):
             suns = tuple(SunLight(f"sun {number}", -way, np.ones(3, np.float32)) for number, way in enumerate(self._towards))
             lit = LightContext(replace(context.scene, lights=suns), context.threads, same_surfaces=context)
-            sources.append(source_columns(self._cache, lit, _SUN_SAMPLES, progress.span(0.35, 0.5)))
-        solved = solve_columns(self._cache, np.concatenate(sources, axis=1), None, TOLERANCE, progress.span(0.5, 0.8))
+            sources.append(source_columns(self._cache, lit, _SUN_SAMPLES, progress.span(0.05, 0.3)))
+        solved = solve_columns(self._cache, np.concatenate(sources, axis=1), None, TOLERANCE, progress.span(0.3, 0.8))
         by_hit = context.surfaces.albedo_by_triangle() is None
         radiance, passed = radiance_of(self._cache, solved, by_hit)
         parts = parallel_for(lambda i: self._weigh(spans[i], texels[i], radiance, passed, by_hit), len(spans), context.threads,

@@ -83,7 +83,7 @@ def _baked(scene: Scene, field: Field | None, settings: SphereSettings, seed: in
     middle = centres.mean(axis=0)
     reach = max(float(np.linalg.norm(centre - middle)) + 0.5 * probe.extent**(1 / 3)
                 for centre, probe in zip(centres, kept, strict=True))
-    baking = _Baking(CachedScene(context, middle, reach), field, settings, seed)
+    baking = _Baking(CachedScene.about(context, middle, reach), field, settings, seed)
     maps = baking.maps(kept, progress.span(0.0, 0.8))
     clipped = [probe.name for probe, image in zip(kept, maps, strict=True) if image.max() > MOST]
     if clipped:

@@ -14,6 +14,7 @@ from ...progress import Progress
 from ...scene import PointLight, ProbeVolume, Scene, SunLight
 from ...scene.memory import require_memory
 from ...transport.cache.columns import sky_columns, solve_columns, source_columns
+from ...transport.cache.relighting import light_again
 from ...transport.cache.surface_cache import Traced
 from ...transport.context import LightContext
 from ...transport.parallel import parallel_for, thread_count
@@ -150,7 +151,7 @@ class TransferBake:
             span = progress.span(number / len(self._columns), (number + 1) / len(self._columns))
             cache = self.cache.under(column.context, Traced(self.cache.table, self.cache.form_factors, self.cache.rows))
             if settings.bounces != 0:
-                cache.light_again(span.span(0.0, 0.5))
+                light_again(cache, span.span(0.0, 0.5))
                 cache.solve(settings.bounces, SOLVER_SHARE * settings.target, span.span(0.5, 1.0))
             result.append(Gatherer(column.context, cache, self._placement, settings, self._seed))
         return result

@@ -7,12 +7,14 @@ import numpy as np
 
 from ...progress import Progress
 from ..context import LightContext
+from ..lights.links import LightLinks
 from ..paths.direct import Receiver, sample_environment
 from ..paths.numbers import PathNumbers
 from ..rays.tracer import offset_origins
 from ..vectors import dot
 from .hit_light import HitLight, HitRays
-from .surface_cache import SurfaceCache
+from .relighting import light_again
+from .surface_cache import SurfaceCache, Traced
 from .texel_table import SurfaceHits
 from .texels import Focus, TexelLayout, size_for
 
@@ -54,21 +56,33 @@ class Looks:
 
 
 class CachedScene:
-    """A scene whose surfaces hold their light, accurate about a sphere of ``radius`` [m] around ``center_world`` (3,).
+    """A scene whose surfaces hold their light; made ``about`` a sphere of ``radius`` [m] around ``center_world`` (3,) it is
+    accurate there.
 
     Rays are looked along in three steps: ``look``, by any number of threads; ``settle``, once for all of them, which brings into
     the cache what they met; ``radiance``, by threads again. The same for any number of threads.
     """
 
-    def __init__(self, context: LightContext, center_world: np.ndarray, radius: float, seed: int = 0):
-        self.context = context
-        size = size_for(context.geometry, center_world, radius, TEXELS)
-        lit_alike = context.links.lit_alike if context.links.has_receivers else None
-        layout = TexelLayout(context.geometry, Focus(center_world, radius, size), lit_alike)
-        self.cache = SurfaceCache(context, layout, seed, RAYS, smoothness=SMOOTHNESS)
-        self._hit_light = HitLight(self.cache)
+    def __init__(self, context: LightContext, cache: SurfaceCache):
+        self.context, self.cache = context, cache
+        self._hit_light = HitLight(cache)
         # Where everything glows, samples of it add nothing but noise.
-        self._samples_emitters = self.cache.emitter_samples > 0
+        self._samples_emitters = cache.emitter_samples > 0
+
+    @classmethod
+    def about(cls, context: LightContext, center_world: np.ndarray, radius: float, seed: int = 0,
+              links: LightLinks | None = None) -> "CachedScene":
+        """The scene of ``context``, no light known yet; lights to come are linked as ``links`` say (None: as its own)."""
+        size, links = size_for(context.geometry, center_world, radius, TEXELS), links or context.links
+        layout = TexelLayout(context.geometry, Focus(center_world, radius, size), links.lit_alike if links.has_receivers else None)
+        return cls(context, SurfaceCache(context, layout, seed, RAYS, smoothness=SMOOTHNESS))
+
+    def under(self, context: LightContext, progress: Progress) -> "CachedScene":
+        """The same surfaces, in as many texels as are in use, under the light of another ``context`` of theirs. Raises
+        Cancelled."""
+        cache = self.cache.under(context, Traced(self.cache.table, self.cache.form_factors, self.cache.rows))
+        light_again(cache, progress)
+        return CachedScene(context, cache)
 
     def look(self, origins: np.ndarray, directions: np.ndarray, numbers: PathNumbers,
              density: np.ndarray | None = None, depth: int = 0) -> Looks:

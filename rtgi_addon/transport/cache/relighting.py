@@ -51,6 +51,30 @@ def relit_cache(cache: SurfaceCache, context: LightContext, progress: Progress) 
     return other
 
 
+def light_again(cache: SurfaceCache, progress: Progress) -> None:
+    """Find all light that comes to the texels of ``cache`` from elsewhere anew, after ``SurfaceCache.under`` made it for another
+    context: what a bake in that context would find, for ``solve``. Rays are traced again only where surfaces or media shine, or a
+    world through what colours it. Raises Cancelled."""
+    context, rows, spans = cache.context, cache.rows, cache.form_factors.spans()
+    # Form factors keep colours in 16 bits.
+    coloured = bool(cache.form_factors.tints) and not context.environment.is_black
+    traced = context.surfaces.has_emission or cache.walks_media or coloured
+
+    def work(i):
+        texels = np.arange(spans[i].start, spans[i].stop)
+        if traced:
+            return cache.met_again(texels)
+        slots, surface = cache.table.slots[texels], cache.sampler.on_texels(texels, cache.points)
+        none = np.zeros((len(texels), 3), np.float32)
+        sky = none if context.environment.is_black else cache.sky_again(slots, surface, i)
+        return TexelRows(sky, none, *cache.light.direct(slots, surface), rows.albedo[texels], rows.translucency[texels],
+                         rows.opposite[texels], cache.light.limited(slots, surface))
+
+    parts = parallel_for(work, len(spans), context.threads, progress, "light on the surface cache")
+    found = TexelRows.none(len(cache.light.limits), cache.light.choices).followed_by(parts)
+    cache.rows = replace(found, opposite=rows.opposite)
+
+
 def thought_to_receive(cache: SurfaceCache, before: SurfaceCache) -> np.ndarray:
     """What the texels of ``cache`` may receive (n + 1, 3) from one another, by what they received in ``before``, which is solved:
     as much more as leaves all of them together."""

@@ -7,7 +7,6 @@ lamps nor world. What the method is not: exact in space. A texel holds the mean 
 surfaces is blurred to texel size; the light of lamps is therefore taken at the hit point wherever rays can be afforded.
 """
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -243,14 +242,9 @@ class SurfaceCache:
         directions, escaped, tints = self.escaped_again(slots, surface, block)
         return self._sky(directions, escaped, len(slots), tints)
 
-    def light_again(self, progress: Progress) -> None:
-        """Find all light that comes to the texels from elsewhere anew, for a cache ``under`` another context: their rays are the
-        same, so this is the light that a bake in that context would find."""
-        spans = self.form_factors.spans()
-        parts = parallel_for(lambda i: self._trace(np.arange(spans[i].start, spans[i].stop)).rows, len(spans), self.context.threads,
-                             progress, "light on the surface cache")
-        none = TexelRows.none(len(self.light.limits), self.light.choices)
-        self.rows = replace(none.followed_by(parts), opposite=self.rows.opposite)
+    def met_again(self, texels: np.ndarray) -> TexelRows:
+        """Rows of ``texels`` (n,) in use, by the light that their rays find, which are traced again: for a cache made ``under``."""
+        return self._trace(texels).rows
 
     def _sky(self, directions, escaped, n: int, tints: np.ndarray | None) -> np.ndarray:
         if escaped.size == 0 or self.context.environment.is_black:
