@@ -4,8 +4,10 @@
 
 Every bake is a process of its own, forked from one that has read the sample; its peak is of resident memory, above what was there
 before the bake (evaluate/costs.py). Estimates are what the pre-flight and the technique ask for (scene/memory.py), each part before
-it is taken: how many rays probes want is known once they have a few. They should lie 10 % below to 50 % above the peak: below, a
-bake may be killed that was let through; above, one is refused that would fit.
+it is taken: how many rays probes want is known once they have a few. What is asked for counts on top of what the process has grown
+by until then, or of what the pre-flight asked for if that is more; the most of all such sums is the estimate. It should lie 10 %
+below to 50 % above the peak: below, a bake may be killed that was let through; above, one is refused that would fit. "At first" is
+what the first of them alone says.
 """
 
 import argparse
@@ -24,31 +26,27 @@ def measure(scene, technique: str, overrides: dict, threads: int | None) -> dict
     import numpy as np
 
     from rtgi_addon import techniques
-    from rtgi_addon.evaluate.costs import metered
+    from rtgi_addon.evaluate.costs import metered, resident_bytes
     from rtgi_addon.jobs.settings import build_settings
     from rtgi_addon.progress import Progress
     from rtgi_addon.scene import memory
     method = techniques.get(technique)
     settings = build_settings(method, overrides)
-    asked, shortage = [], memory.shortage
+    first, asked, shortage = memory.estimate_bytes(scene, getattr(settings, "order", 2)), [], memory.shortage
 
     def listening(needs, free):
-        asked.append(needs)
+        asked.append((max(resident_bytes() - before, sum(first.values())), needs))
         return shortage(needs, free)
 
     memory.shortage = listening
     with metered() as costs:
+        before = resident_bytes()
         field = method.bake(scene, settings, np.random.default_rng(0), Progress(), threads=threads)
         field.grids()
-    needs = memory.estimate_bytes(scene, getattr(settings, "order", 2))
-    for part in asked:
-        needs |= {name: max(count, needs.get(name, 0)) for name, count in part.items()}
-    # These are asked for as they grow, the cache also for what it may become.
-    for name, first in (("the surface cache", 1), ("virtual lights", 0)):
-        grown = [part[name] for part in asked if name in part]
-        if grown:
-            needs[name] = max(grown[0], sum(grown[first:]))
-    return {"estimate": sum(needs.values()), "peak": costs.peak_bytes, "needs": needs, "seconds": costs.seconds,
+    sums = [held + sum(needs.values()) for held, needs in asked] or [sum(first.values())]
+    held, needs = asked[int(np.argmax(sums))] if asked else (0, first)
+    return {"estimate": max(sums), "at_first": sums[0], "peak": costs.peak_bytes, "held": held, "needs": needs, "preflight": first,
+            "seconds": costs.seconds,
             "stats": {name: value for name, value in field.stats.items() if isinstance(value, (int, float))}}
 
 
@@ -81,7 +79,7 @@ def main() -> None:
     arguments = parser.parse_args()
     samples = arguments.samples or sorted(path.stem for path in (ROOT / "sample_blends").glob("*.blend"))
     overrides = {name: json.loads(value) for name, _, value in (word.partition("=") for word in arguments.overrides)}
-    print("| sample | technique | estimate [MiB] | peak [MiB] | off |\n|---|---|---:|---:|---:|", flush=True)
+    print("| sample | technique | at first [MiB] | estimate [MiB] | peak [MiB] | off |\n|---|---|---:|---:|---:|---:|", flush=True)
     for sample in samples:
         def read(sample=sample):
             import bpy
@@ -94,8 +92,8 @@ def main() -> None:
                 if not found:
                     continue
                 off = found["estimate"] / found["peak"] - 1.0
-                print(f"| {sample} | {technique} | {found['estimate'] / 2**20:,.0f} | {found['peak'] / 2**20:,.0f} | {off:+.0%} |",
-                      flush=True)
+                print(f"| {sample} | {technique} | {found['at_first'] / 2**20:,.0f} | {found['estimate'] / 2**20:,.0f} | "
+                      f"{found['peak'] / 2**20:,.0f} | {off:+.0%} |", flush=True)
                 print(json.dumps(found), file=sys.stderr, flush=True)
             return {"done": True}
 

@@ -15,7 +15,7 @@ BYTES_PER_TRIANGLE = 300
 # Its SH coefficients (RGB, for the running sums and the result), and beside them the depth tile, flags and what is put together.
 BYTES_PER_COEFFICIENT, BYTES_PER_PROBE = 76, 3000
 # Code that is loaded only now and small tables; the stack and temporaries of a thread.
-BASE_BYTES, BYTES_PER_THREAD = 8 << 20, 10 << 20
+BASE_BYTES, BYTES_PER_THREAD = 8 << 20, 4 << 20
 # An image is read in texels of four channels. The world is split into bright patches and the rest, in double precision.
 CHANNELS, BYTES_PER_WORLD_TEXEL = 4, 115
 

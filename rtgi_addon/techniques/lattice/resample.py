@@ -57,11 +57,14 @@ def resample(field: Field, context: LightContext, volumes: tuple[ProbeVolume, ..
     return tuple(dilate(grid) for grid in _cut(placement, volumes, coefficients, visibility))
 
 
-def thread_bytes(context: LightContext) -> int:
-    """Memory [bytes] of all threads together while the volumes of ``context`` are resampled."""
+def thread_bytes(context: LightContext, gathers: bool = True) -> int:
+    """Memory [bytes] of all threads together while the volumes of ``context`` are resampled, by a field that ``gathers`` light
+    anew at every probe or looks it up."""
     threads = thread_count(context.threads)
     probes = sum(int(np.prod(volume.resolution)) for volume in context.scene.volumes)
-    return BYTES_PER_THREAD * threads + BYTES_PER_RAY * min(probes * VISIBILITY_RAYS, CHUNK * threads)
+    working, measuring = BYTES_PER_THREAD * threads, BYTES_PER_RAY * min(probes * VISIBILITY_RAYS, CHUNK * threads)
+    # What was taken for distances is not given back before light is gathered.
+    return working + measuring if gathers else max(working, measuring)
 
 
 def _visibility(context: LightContext, placement: Placement, seed: int, threads: int | None, progress: Progress) -> np.ndarray:

@@ -63,8 +63,10 @@ def capture_maps(context: LightContext, kernels, grids: tuple[LpvGrid, ...], res
     outermost, bounds = grids[-1], np.array(context.geometry.bounds(), np.float64)
     maps, views_of = [], map_views(context.scene, bounds, grids, resolution)
     texels = sum(view.resolution**2 for views in views_of for view in views)
+    # Points on emissive surfaces become light as texels do, on both sides.
+    glowing = 2 * EMITTER_POINTS * BYTES_PER_TEXEL if context.emitters.count else 0
     require_memory({"shadow maps": texels * BYTES_PER_TEXEL, "cells": sum(grid.count for grid in grids) * BYTES_PER_CELL,
-                    "threads": thread_bytes(context)})
+                    "emissive surfaces": glowing, "threads": thread_bytes(context, gathers=False)})
     for lamp, views in enumerate(views_of):
         progress.step(lamp / context.lamps.count, "capturing reflective shadow maps")
         of_lamp = [kernels.capture(context, view) for view in views]

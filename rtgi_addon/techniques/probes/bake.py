@@ -27,7 +27,7 @@ from .distances import mean_distances
 from .gather import GROUP, RAYS_PER_LIGHT_SAMPLE, Gatherer, gather
 from .item_rays import BLOCK_RAYS, ITEM_RAYS
 from .items import Item
-from .memory import BYTES_PER_HIT, ray_bytes, working_bytes
+from .memory import RayBytes, later_bytes, working_bytes
 from .reach import Reach, reach_of
 from .relight import MAX_KEPT_RAYS, HitMemory
 from .settings import ProbeSettings
@@ -165,9 +165,10 @@ class ProbeBake:
                 self._goal = self._plan()
                 if self._goal is None:
                     return
-                if self._round == len(self._rounds):
-                    # Now the probes themselves have said how many they want.
-                    require_memory({"rays": ray_bytes(self._expected_rays(), self._reach.hits, BATCH_RAYS, MAX_KEPT_RAYS)})
+                if self._round == len(self._rounds) + 1:
+                    # Now the probes themselves have said how many they want, spread as they are.
+                    require_memory(later_bytes(self.context, self._reach.hits, self.model.rays, self._rays_needed(), BATCH_RAYS,
+                                               MAX_KEPT_RAYS))
                 self._next = 0
                 self._sums[:] = 0
                 if self._spreading is not None and self._round >= len(self._rounds):
@@ -282,7 +283,7 @@ class ProbeBake:
 
     def _run_batch(self, batch: list[Item], label: str, progress: Progress, shares: Shares) -> None:
         # All of them: a part of the probes may stand where more rays hit than elsewhere.
-        require_memory({"rays": BYTES_PER_HIT * sum(item.ray_count for item in batch)})
+        require_memory({"rays": int(RayBytes.of(self.context).held * sum(item.ray_count for item in batch))})
         for item, hits, texel, sums in zip(batch, *gather(self.gatherer, batch, progress, label, shares), strict=True):
             self._sums[sums.probes] += sums.sh
             self._distance[sums.probes] += sums.distance

@@ -28,7 +28,7 @@ from .block_field import BlockField, Bricks, Read
 from .captured import capturing, lamp_light_of
 from .gather import GROUP, Gatherer, gather
 from .gathering import items_of
-from .memory import BYTES_PER_HIT, working_bytes
+from .memory import RayBytes, working_bytes
 from .reach import Reach
 from .relight import MAX_KEPT_RAYS
 from .settings import ProbeSettings
@@ -69,7 +69,7 @@ class _Group:
             require_memory(working_bytes(self.cache, settings, Reach(0, 1.0), len(probes), BATCH_RAYS, MAX_KEPT_RAYS))
             items, done = items_of(probes, GROUP, rays), 0
             for batch in batches(items):
-                require_memory({"rays": BYTES_PER_HIT * sum(item.ray_count for item in batch)})
+                require_memory({"rays": int(RayBytes.of(self.context).held * sum(item.ray_count for item in batch))})
                 span = progress.span(done / len(items), (done + len(batch)) / len(items))
                 traced = parallel_for(lambda i, batch=batch: gatherer.trace(batch[i]), len(batch), self.context.threads,
                                       span.span(0.0, 0.5), "what probes look at")

@@ -25,6 +25,7 @@ from ..vectors import dot
 from .bright import TEXEL_SAMPLES, BrightSurfaces, find_bright
 from .form_factors import FormFactors
 from .media_walks import TexelWalks, on_texels
+from .memory import traced_bytes
 from .solver import solve_radiosity
 from .surface_points import SurfacePoints, TexelSampler
 from .texel_kernels import TexelRays, texel_rays, tracer_of
@@ -71,10 +72,6 @@ class _Batch(NamedTuple):
     tints: np.ndarray | None
     rows: TexelRows
 
-# Measured: what a texel holds and what goes through the solver, each of its rays while all of them are put together, and each of
-# the sources that it may choose.
-BYTES_PER_TEXEL, BYTES_PER_TEXEL_RAY, BYTES_PER_CHOICE = 640, 32, 12
-
 
 class SurfaceCache:
     """Irradiance per texel, from ``rays`` cosine rays and up to ``lamp_samples`` shadow rays per source for each.
@@ -117,11 +114,6 @@ class SurfaceCache:
         """Whether the sources are too many to sample all of them everywhere."""
         return self.sources.count > ALL_SOURCES
 
-    def bytes_of(self, texels: int) -> int:
-        """Memory at the peak of tracing so many texels."""
-        rays = self.rays * (2 if self.context.media.scatters else 1)
-        return texels * (BYTES_PER_TEXEL + BYTES_PER_TEXEL_RAY * rays + BYTES_PER_CHOICE * self.light.choices)
-
     def reach(self, parts: list[SurfaceHits], progress: Progress, expected: int = 0) -> list[np.ndarray]:
         """The texel (n,) int32 of every hit of each part, after bringing those into use and all that their rays reach in turn:
         about as many that ``expected`` (0: unknown) are then in use, for the progress.
@@ -133,7 +125,7 @@ class SurfaceCache:
             if self.table.count > self._max_texels:
                 raise BakeError(f"the surface cache needs more than {self._max_texels:,} texels",
                                 "raise the texel size, or place the probe volumes closer to what they light")
-            require_memory({"the surface cache": self.bytes_of(self.table.count - self.count)})
+            require_memory({"the surface cache": traced_bytes(self, self.table.count - self.count)})
             whole = max(expected, self.table.count) - before
             self._trace_batch(np.arange(self.count, self.table.count), progress.span(
                 (self.count - before) / whole, (self.table.count - before) / whole))

@@ -6,14 +6,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from room_scenes import textured_room
 from scene_builders import closed_box
 
 from rtgi_addon.errors import BakeError
 from rtgi_addon.progress import Progress
 from rtgi_addon.scene import memory
 from rtgi_addon.techniques import get
-from rtgi_addon.techniques.probes.memory import expected_rays
+from rtgi_addon.techniques.base import Checkpoint
+from rtgi_addon.techniques.probes.bake import BATCH_RAYS, MAX_KEPT_RAYS, ProbeBake, surface_cache
+from rtgi_addon.techniques.probes.captured import lamp_light_of
+from rtgi_addon.techniques.probes.memory import RayBytes, expected_rays, largest_round, working_bytes
+from rtgi_addon.techniques.probes.reach import Reach
 from rtgi_addon.techniques.probes.settings import ProbeSettings
+from rtgi_addon.transport.cache.memory import kept_bytes, traced_bytes
+from rtgi_addon.transport.context import LightContext
 
 ROOT = Path(__file__).resolve().parents[3]
 MEASURE = """
@@ -24,7 +31,8 @@ from scene_builders import closed_box
 from rtgi_addon.progress import Progress
 from rtgi_addon.scene.memory import estimate_bytes
 from rtgi_addon.techniques import get
-from rtgi_addon.techniques.probes.bake import BATCH_RAYS, MAX_KEPT_RAYS, surface_cache
+from rtgi_addon.techniques.base import Checkpoint
+from rtgi_addon.techniques.probes.bake import BATCH_RAYS, MAX_KEPT_RAYS, ProbeBake, surface_cache
 from rtgi_addon.techniques.probes.memory import working_bytes
 from rtgi_addon.techniques.probes.reach import reach_of
 from rtgi_addon.transport.context import LightContext
@@ -82,6 +90,36 @@ def test_a_lower_error_takes_more_rays():
     assert expected_rays(ProbeSettings(rays=100)) == 100
     assert expected_rays(ProbeSettings(error=0.1)) < expected_rays(ProbeSettings()) < expected_rays(ProbeSettings(error=0.003))
     assert expected_rays(ProbeSettings(error=0.001)) == ProbeSettings().max_rays
+
+
+def test_what_is_not_there_together_is_not_added_up():
+    """Texels are traced by the first rays and kept beside the last: many texels make the one moment the larger, many rays the
+    other."""
+    scene, settings = closed_box(), ProbeSettings()
+    cache = surface_cache(LightContext(scene, 1), scene.volumes, settings, 0)
+    layout = working_bytes(cache, settings, Reach(0, 1.0), 0, BATCH_RAYS, MAX_KEPT_RAYS)["the surface cache"]
+    few, many = (working_bytes(cache, settings, Reach(20000, 1.0), probes, BATCH_RAYS, MAX_KEPT_RAYS) for probes in (10, 4000))
+    assert few["the surface cache"] - layout == traced_bytes(cache, 20000)
+    assert many["the surface cache"] - layout == kept_bytes(cache, 20000) < 0.5 * traced_bytes(cache, 20000)
+    assert many["rays"] > 100 * few["rays"] and sum(many.values()) > sum(few.values())
+
+
+def test_what_varies_within_triangles_is_kept_with_the_rays():
+    """What a bake keeps of each ray is what was counted for it, give or take a share of a direction."""
+    settings = ProbeSettings(rays=512, texel_size=0.3)
+    for scene in (closed_box(), textured_room()):
+        bake = ProbeBake(LightContext(scene, 1), scene.volumes, settings, 0, Progress(), Checkpoint(), "bake",
+                         lamp_light_of(LightContext(scene, 1), scene.volumes[0], settings, 0))
+        bake.run()
+        kept = sum(array.nbytes for item in bake.memory.items for array in (item.directions, item.texel, item.escaped, item.albedo)
+                   if array is not None)
+        assert abs(kept / bake.ray_count - RayBytes.of(bake.context).kept) < 2.0
+
+
+def test_the_largest_round_is_that_of_the_doublings():
+    assert largest_round(np.array([512, 512]), np.array([2048, 700])) == 1024
+    assert largest_round(np.array([512, 512]), np.array([600, 1000])) == 88 + 488
+    assert largest_round(np.array([512]), np.array([100])) == 0
 
 
 def test_what_takes_most_says_what_to_do():
