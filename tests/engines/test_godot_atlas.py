@@ -16,6 +16,7 @@ from rtgi_addon.effects.atlas.sheet import LightAtlas
 from rtgi_addon.effects.atlas.unwrapped import Sheet
 from rtgi_addon.errors import BakeError
 from rtgi_addon.exchange import engines
+from rtgi_addon.exchange.engines import ExportSettings
 from rtgi_addon.exchange.engines.atlas import engine_atlas
 from rtgi_addon.exchange.engines.atlas_transfer import engine_atlas_transfer
 from rtgi_addon.exchange.engines.axes import Y_UP
@@ -44,6 +45,20 @@ def test_files(whole):
     assert "#define RTGI_HAS_ATLAS" in (whole.out / "rtgi/irradiance.gdshaderinc").read_text()
     for case in json.loads((whole.out / "conformance/atlas.json").read_text())["cases"]:
         assert len(case["st"]) == 200 and np.max(case["tolerance"]) < 0.02 * np.max(case["irradiance"])
+
+
+@pytest.mark.parametrize("strength", [1e-3, 1.0, 1e3])
+def test_no_texel_is_dimmer_than_halves_that_godot_reads(tmp_path, strength):
+    """Godot reads halves below 2^-14 as 0; in a room of 0.002 W/m^2 that was 3 % of the light."""
+    bundle = atlas_bundle()
+    dim = replace(bundle, atlas=replace(bundle.atlas, coefficients=bundle.atlas.coefficients * np.float32(strength)))
+    out = GODOT.export(dim, tmp_path / "out", ExportSettings(part="files")).out
+    planes, _ = read_exr(out / "rtgi/atlas/texels.exr")
+    stored = np.stack([planes[name] for name in "RGBA"], axis=-1).astype(np.float64)
+    stored[np.abs(stored) < np.finfo(np.float16).smallest_normal] = 0.0
+    scale = json.loads((out / "rtgi/atlas.json").read_text())["scale"]
+    expected = engine_atlas(dim.atlas, Y_UP).slices.astype(np.float64)
+    assert np.allclose(np.sort(stored[stored != 0] * scale), np.sort(expected[expected != 0]), rtol=1e-12, atol=0.0)
 
 
 def test_without_one_none_of_it(kit_bundle, tmp_path):

@@ -3,6 +3,8 @@
 import json
 from pathlib import Path
 
+import numpy as np
+
 from ..atlas import EngineAtlas, atlas_glsl, require_texture
 from ..atlas_transfer import EngineAtlasTransfer, relight_glsl
 from ..base import write_text
@@ -14,6 +16,8 @@ RELIT_INDEX, TABLE, SHADER = "atlas_transfer.json", "atlas/transfer.exr", "atlas
 # What goes into a project beside what is written here.
 FILES = ("atlas.gd",)
 _FILES = Path(__file__).parent / "files" / "rtgi"
+# The exponent of what the largest number is stored as at most: Godot reads halves below 2^-14 as 0.
+_LARGEST = 15
 # UV maps that Godot imports of a mesh.
 TEXCOORDS = 2
 _HEAD = """
@@ -23,12 +27,13 @@ uniform bool rtgi_atlas_ready = false;
 uniform bool rtgi_atlas_second = false;
 uniform vec3 rtgi_atlas_place = vec3(1.0, 0.0, 0.0);
 uniform mat4 rtgi_atlas_local_from_world = mat4(1.0);
+uniform float rtgi_atlas_scale = 1.0;
 uniform sampler3D rtgi_atlas_texels : filter_nearest, repeat_disable;
 #define RTGI_ATLAS_SIZE (textureSize(rtgi_atlas_texels, 0).xy)
 """
 _BAKED = """
 vec4 rtgi_atlas_texel(ivec2 texel, int channel) {
-	return texelFetch(rtgi_atlas_texels, ivec3(texel, channel), 0);
+	return rtgi_atlas_scale * texelFetch(rtgi_atlas_texels, ivec3(texel, channel), 0);
 }
 
 """
@@ -40,7 +45,7 @@ vec4 rtgi_atlas_texel(ivec2 texel, int channel) {
 	if (rtgi_atlas_relit) {
 		return texelFetch(rtgi_atlas_shown, ivec2(texel.x, channel * RTGI_ATLAS_SIZE.y + texel.y), 0);
 	}
-	return texelFetch(rtgi_atlas_texels, ivec3(texel, channel), 0);
+	return rtgi_atlas_scale * texelFetch(rtgi_atlas_texels, ivec3(texel, channel), 0);
 }
 
 """
@@ -57,8 +62,10 @@ def write_atlas(folder: Path, atlas: EngineAtlas, transfer: EngineAtlasTransfer 
     """Write what depends on ``atlas`` and its ``transfer`` into ``folder``. Raises BakeError for what no 3D texture holds,
     OSError."""
     require_texture(atlas, MAX_SIDE, "Godot")
-    write_slices(folder / TEXELS, atlas.slices, "the light atlas")
-    write_text(folder / INDEX, json.dumps({"texels": TEXELS, "parts": atlas.entries}, indent=1) + "\n")
+    # A power of two loses nothing.
+    scale = 2.0 ** min(int(np.frexp(np.abs(atlas.slices).max(initial=0.0))[1]) - _LARGEST, 0)
+    write_slices(folder / TEXELS, (atlas.slices / np.float32(scale)).astype(np.float16), "the light atlas")
+    write_text(folder / INDEX, json.dumps({"texels": TEXELS, "scale": scale, "parts": atlas.entries}, indent=1) + "\n")
     if transfer is not None:
         write_slices(folder / TABLE, transfer.slices, "the light atlas's transfer")
         index = {**transfer.to_json(), "volumes": [{"table": TABLE, "down": 1}]}

@@ -1,7 +1,8 @@
 """Probe volumes as EXR flipbooks that Godot imports as Texture3D, with the import settings beside them.
 
-probes.exr is RGBA of half floats, eight blocks of nz slices: (way from lattice point to probe, 1 if it holds light); SH of
-radiance, red 0-3, red 4-7, green 0-3, green 4-7, blue 0-3, blue 4-7; (red 8, green 8, blue 8, 0). distances.exr is RG of float32:
+probes.exr is RGBA of half floats, eight blocks of nz slices: (way from lattice point to probe, its scale, negative if it holds no
+light); SH of radiance over that scale, red 0-3, red 4-7, green 0-3, green 4-7, blue 0-3, blue 4-7; (red 8, green 8, blue 8, 0).
+Scales are powers of two: Godot reads halves below 2^-14 as 0, which of dim probes would be much. distances.exr is RG of float32:
 their variance is a difference of the two, for which halves are too coarse. nodes.exr, of a scattered volume, is RGBA of float32:
 what each of its nodes names (scene/scattered.py); its probes are a list, whose first block has their ways from the volume's centre.
 """
@@ -20,6 +21,8 @@ from ..volumes import ExportVolume, to_half
 PROBES, DISTANCES, NODES = "probes.exr", "distances.exr", "nodes.exr"
 # Blocks of slices in PROBES.
 _BLOCKS = 8
+# The exponents of the least scale of a probe and of what its largest number is to be at most, a sixteenth of what halves hold.
+_LEAST_SCALE, _LARGEST = -14, 12
 # The end of an import record's name.
 IMPORT = ".import"
 # The least side of 3D textures that Vulkan and desktop OpenGL drivers have.
@@ -76,11 +79,14 @@ def blend_import(theirs: bytes, ours: bytes) -> bytes | None:
 def _probes(volume: ExportVolume) -> np.ndarray:
     """(8·nz, ny, nx, 4) float16."""
     blocks = np.zeros((_BLOCKS, *volume.live.shape, 4), np.float32)
-    blocks[0, ..., :3], blocks[0, ..., 3] = volume.offset, volume.live
+    exponent = np.frexp(np.abs(volume.sh).max(axis=(3, 4)))[1]
+    scale = np.exp2(np.clip(exponent - _LARGEST, _LEAST_SCALE, 0)).astype(np.float32)
+    coefficients = volume.sh / scale[..., None, None]
+    blocks[0, ..., :3], blocks[0, ..., 3] = volume.offset, np.where(volume.live, scale, -scale)
     for channel in range(3):
-        blocks[1 + 2 * channel] = volume.sh[..., 0:4, channel]
-        blocks[2 + 2 * channel] = volume.sh[..., 4:8, channel]
-        blocks[7, ..., channel] = volume.sh[..., 8, channel]
+        blocks[1 + 2 * channel] = coefficients[..., 0:4, channel]
+        blocks[2 + 2 * channel] = coefficients[..., 4:8, channel]
+        blocks[7, ..., channel] = coefficients[..., 8, channel]
     return to_half(blocks.reshape(-1, *blocks.shape[2:]), f"a probe of volume {volume.name!r}")
 
 

@@ -7,6 +7,8 @@ const Volumes := preload("volumes.gd")
 ## Where the bake's own axes lie in the world: turned and moved, not scaled.
 var world_from_local := Transform3D.IDENTITY
 var texture: Texture3D
+## What the numbers of the texture are over.
+var scale := 1.0
 ## What relight.gd draws of it under other light, or null: it keeps the light of the bake. Beside it, for scripts, its tables (relit.gd)
 ## and what shines.
 var shown: Texture2D
@@ -29,6 +31,7 @@ func open(folder: String) -> Error:
 			_parts[(part["name"] as String).validate_node_name()] = part
 	_slices.clear()
 	texture = Volumes.texture_of(folder, index["texels"])
+	scale = index.get("scale", 1.0)
 	return OK if texture != null else ERR_FILE_MISSING_DEPENDENCIES
 
 
@@ -45,6 +48,7 @@ func apply_to(material: ShaderMaterial, part: String) -> void:
 	material.set_shader_parameter("rtgi_atlas_second", entry["texcoord"] == 1)
 	material.set_shader_parameter("rtgi_atlas_local_from_world", Projection(world_from_local.affine_inverse()))
 	material.set_shader_parameter("rtgi_atlas_texels", texture)
+	material.set_shader_parameter("rtgi_atlas_scale", scale)
 	if shown != null:
 		material.set_shader_parameter("rtgi_atlas_shown", shown)
 		material.set_shader_parameter("rtgi_atlas_relit", true)
@@ -75,7 +79,7 @@ func irradiance(part: String, st: Vector2, normal_world: Vector3) -> Color:
 ## The four coefficients of a channel of a texel, under what shines.
 func _texel(channel: int, at: Vector2i) -> Vector4:
 	if relit == null:
-		return _vector(_slices[channel].get_pixelv(at))
+		return scale * _vector(_slices[channel].get_pixelv(at))
 	if _tables.is_empty():
 		_tables = Volumes.slices_of(relit.tables[0])
 	var total := Vector4.ZERO

@@ -37,7 +37,7 @@ class Volume:
 	var shown: Texture2D  ## what is drawn with where light changes at run time: the slices of `probes` side by side, as in the file
 	var sheet: Vector2i  ## its size
 	var distances: Texture3D
-	var places: PackedColorArray  ## per probe: from lattice point to probe, 1 if it holds light
+	var places: PackedColorArray  ## per probe: from lattice point to probe, its scale, negative if it holds no light
 	var harmonics: PackedVector3Array  ## per probe: nine SH of radiance
 	var moments: PackedVector2Array  ## tiles, row after row of the distances' slices
 	var row_length: int
@@ -178,7 +178,7 @@ func _volume_irradiance(volume: Volume, offset: Vector3, normal: Vector3, surfac
 			var place := volume.places[index]
 			var probe := origin + Vector3(place.r, place.g, place.b)
 			var seen := _side_weight(probe - offset, surface_normal) * _visibility(volume, index, biased - probe)
-			var weight := _probe_weight(trilinear * named[1], seen, named[2] and place.a != 0.0)
+			var weight := _probe_weight(trilinear * named[1], seen, named[2] and place.a > 0.0)
 			total += weight
 			for band in 9:
 				sum += weight * basis[band] * volume.harmonics[index * 9 + band]
@@ -290,14 +290,15 @@ static func _read_back(volume: Volume) -> void:
 		for y in count.y:
 			for x in count.x:
 				volume.places[index] = slices[z].get_pixel(x, y)
+				var scale := absf(volume.places[index].a)
 				for half in 2:
 					var red := slices[(1 + half) * count.z + z].get_pixel(x, y)
 					var green := slices[(3 + half) * count.z + z].get_pixel(x, y)
 					var blue := slices[(5 + half) * count.z + z].get_pixel(x, y)
 					for band in 4:
-						volume.harmonics[index * 9 + half * 4 + band] = Vector3(red[band], green[band], blue[band])
+						volume.harmonics[index * 9 + half * 4 + band] = scale * Vector3(red[band], green[band], blue[band])
 				var ninth := slices[7 * count.z + z].get_pixel(x, y)
-				volume.harmonics[index * 9 + 8] = Vector3(ninth.r, ninth.g, ninth.b)
+				volume.harmonics[index * 9 + 8] = scale * Vector3(ninth.r, ninth.g, ninth.b)
 				index += 1
 	if volume.names != null:
 		volume.words.clear()
