@@ -218,7 +218,9 @@ class Gatherer:
     def ray_basis(self, item: Item, directions: np.ndarray) -> np.ndarray:
         """``basis`` (g, n, k) of the ``directions`` (g·n, 3) of an item's rays, times their weights."""
         basis, weights = self.basis(item, directions), self._weights(item)
-        return basis if weights is None else basis * weights[:, :, None]
+        if weights is not None:
+            basis *= weights[:, :, None]
+        return basis
 
     def _weights(self, item: Item) -> np.ndarray | None:
         if item.spread is not None:

@@ -1,6 +1,7 @@
 """Baked probes under other lamps: the rays' hits are kept, so a moved or recoloured light costs no probe or form-factor ray."""
 
 from dataclasses import dataclass
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -142,13 +143,13 @@ def relit_sums(memory: HitMemory, gatherer: Gatherer, sums: np.ndarray, emitted:
             return projected_texels(kept.item.shape, basis, by_texel, kept.texel, sky)
         radiance = np.take(reflected if kept.albedo is not None else by_texel, kept.texel, axis=0, mode="wrap")
         if kept.albedo is not None:
-            radiance[..., :3] *= kept.albedo
+            _multiply(radiance, kept.albedo)
             if cache.rows.passing.size:
                 radiance += np.take(passed, kept.texel, axis=0, mode="wrap")
         if kept.escaped.size and not context.environment.is_black:
             radiance.reshape(-1, 4)[kept.escaped, :3] = _sky(context, kept)
         if kept.tint is not None:
-            radiance[..., :3] *= kept.tint
+            _multiply(radiance, kept.tint)
         return project(basis, radiance)[..., :3]
 
     def work(i):
@@ -164,9 +165,22 @@ def relit_sums(memory: HitMemory, gatherer: Gatherer, sums: np.ndarray, emitted:
     return sums if emitted is None else sums + emitted
 
 
+@cache
+def _halves() -> np.ndarray:
+    """Every float16 by its bits, (65536,) float32: looked up in half the time that numpy takes to convert them."""
+    return np.arange(1 << 16, dtype=np.uint16).view(np.float16).astype(np.float32)
+
+
+def _multiply(radiance: np.ndarray, factors: np.ndarray) -> None:
+    """``radiance`` (…, 4) times ``factors`` (…, 3) float16, in place. Colour by colour: rows of three are slow to go along."""
+    rows, factors = radiance.reshape(-1, 4), np.take(_halves(), factors.reshape(-1, 3).view(np.uint16), mode="clip")
+    for colour in range(3):
+        rows[:, colour] *= factors[:, colour]
+
+
 def _sky(context, kept: _Kept) -> np.ndarray:
     """Radiance (e, 3) of the world, without its bright patches, along the rays that escaped."""
     shared = kept.escaped // kept.item.shape[2]
-    if len(shared) < len(kept.directions):
-        return context.environment.base_radiance(kept.directions[shared])
-    return np.take(context.environment.base_radiance(kept.directions), shared, axis=0)
+    # Rays of one direction follow one another.
+    fresh = np.append(True, np.diff(shared) != 0)
+    return np.take(context.environment.base_radiance(kept.directions[shared[fresh]]), np.cumsum(fresh) - 1, axis=0)

@@ -115,8 +115,13 @@ class Strata:
 
 def _weights(doubled: np.ndarray) -> np.ndarray:
     """Of rays in cells that are ``doubled`` (…) so often."""
-    table = np.append(np.ldexp(np.float32(REFINED / CELLS), -np.arange(MOST_DOUBLED + 1)), 1).astype(np.float32)
-    return table[doubled]
+    return np.take(_known_weights(), doubled, mode="wrap")
+
+
+@cache
+def _known_weights() -> np.ndarray:
+    """By the power of two; the last for the −1 of cells that are not refined."""
+    return np.append(np.ldexp(np.float32(REFINED / CELLS), -np.arange(MOST_DOUBLED + 1)), 1).astype(np.float32)
 
 
 def _cell_of(points: np.ndarray) -> np.ndarray:

@@ -6,12 +6,14 @@ import numpy as np
 
 from ...progress import Progress
 from ..context import LightContext
-from ..parallel import parallel_for
+from ..parallel import chunks, parallel_for
 from .light_changes import FEW_CHANGES, changed_sources
 from .surface_cache import SurfaceCache, Traced
 from .texel_light import ALL_SOURCES
 from .texel_rows import TexelRows
 
+# Points on texels at which lamps are sampled at a time.
+POINTS = 1 << 14
 # What was received before counts up to so many times: of next to nothing that was lit, nothing is to be learnt.
 _MOST_BRIGHTER = 1e3
 
@@ -26,7 +28,8 @@ def relit_cache(cache: SurfaceCache, context: LightContext, progress: Progress) 
     world_changed = context.environment is not cache.context.environment
     gone, came = changed_sources(cache.context, context)
     few = other.sources.count > ALL_SOURCES and len(gone) + len(came) <= FEW_CHANGES
-    spans = cache.form_factors.spans()
+    # The world is asked along the rays of a block; lamps, at fewer points of a texel than it has rays, of more texels at a time.
+    spans = cache.form_factors.spans() if world_changed else chunks(cache.count, POINTS // cache.lamp_samples)
 
     def work(i):
         texels = np.arange(spans[i].start, spans[i].stop)

@@ -2,12 +2,14 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 import room_scenes as rooms
 import scene_builders as build
 from probe_bakes import QUICK, Memory, bake, bytes_of, coefficients, rms
 
 from rtgi_addon.errors import BakeError
+from rtgi_addon.techniques.probes.relight import _multiply
 
 
 def relit_and_fresh(scene, other, **settings):
@@ -64,3 +66,13 @@ def test_relighting_refuses_what_it_cannot_do():
         bake(scene, checkpoint=broken, **QUICK)
     with pytest.raises(BakeError, match="no hits"):
         bake(scene, checkpoint=Memory(broken.stored), **QUICK).relight(scene)
+
+
+def test_what_is_kept_in_halves_multiplies_as_numpy_would():
+    factors = np.arange(1 << 16, dtype=np.uint16).view(np.float16)
+    factors = factors[np.isfinite(factors)][:60000].reshape(4, -1, 3)
+    radiance = np.random.default_rng(0).random((*factors.shape[:2], 4)).astype(np.float32)
+    expected = radiance.copy()
+    expected[..., :3] *= factors
+    _multiply(radiance, factors)
+    assert np.array_equal(radiance, expected)
