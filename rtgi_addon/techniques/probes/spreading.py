@@ -63,9 +63,12 @@ class Spreading:
         if not probes.size:
             return probes
         groups, of_group = np.unique(probes // GROUP, return_inverse=True)
-        light = np.full((len(groups), GROUP, CELLS), -1, np.float32)
-        light[of_group, probes % GROUP] = self._light[self._row[probes]].sum(axis=2)
-        self.strata.refine(groups, light)
+        for start in range(0, len(groups), GROUPS_AT_A_TIME):
+            some = groups[start:start + GROUPS_AT_A_TIME]
+            chosen = np.flatnonzero((of_group >= start) & (of_group < start + GROUPS_AT_A_TIME))
+            light = np.full((len(some), GROUP, CELLS), -1, np.float32)
+            light[of_group[chosen] - start, probes[chosen] % GROUP] = _brightness(self._light[self._row[probes[chosen]]])
+            self.strata.refine(some, light)
         refined = probes[self.strata.refined(groups)[of_group]]
         groups, of_group = np.unique(refined // GROUP, return_inverse=True)
         rows = self._row[refined]
@@ -103,6 +106,11 @@ class Spreading:
 
 # Groups whose first rays are weighed again together: a few MiB of them.
 GROUPS_AT_A_TIME = 64
+
+
+def _brightness(light: np.ndarray) -> np.ndarray:
+    """The sum of the colours (…) of ``light`` (…, 3), which numpy is slow to take along so short an axis."""
+    return light[..., 0] + light[..., 1] + light[..., 2]
 
 
 def _longer(rows: np.ndarray, more: int) -> np.ndarray:
