@@ -8,6 +8,7 @@ it from the first samples of its pixel that show the same surface, unless none d
 
 import numpy as np
 
+from .. import kernels
 from .film import around
 from .frame import GATHERED, Frame, KnownLight
 
@@ -41,7 +42,7 @@ class KeptLight(KnownLight):
             gbuffer = frame.gbuffer
             parts = ((gbuffer.position, np.float32), (gbuffer.normal, np.float16), (frame.kept[GATHERED], np.float32),
                      (gbuffer.albedo, np.float16))
-            self._samples.append(tuple(part[..., :3].reshape(-1, 3).astype(dtype) for part, dtype in parts))
+            self._samples.append(tuple(np.ascontiguousarray(part[..., :3].reshape(-1, 3), dtype) for part, dtype in parts))
 
     def fits(self, count: int) -> bool:
         """Whether there is memory for ``count`` samples like the first."""
@@ -75,6 +76,11 @@ class KeptLight(KnownLight):
         """As ``at``, from some of the samples."""
         total, inverse = np.zeros(points.shape, np.float32), np.float32(1.0) / width
         weight, found = np.zeros((2, len(points)), np.float32)
+        if kernels.is_available():
+            asked = (np.ascontiguousarray(part, dtype) for part, dtype in (
+                (pixel, np.int64), (points, np.float32), (normals, np.float32), (inverse, np.float32)))
+            self._add_kept(numbers, *asked, total, weight, found)
+            return total / np.maximum(weight, _TINY)[:, None], found >= _LEAST_WEIGHT
         for number in numbers:
             kept_points, kept_normals, light, _ = (np.take(part, pixel, axis=0) for part in self._samples[number])
             off = sum(normals[:, axis] * (kept_points[:, axis] - points[:, axis]) for axis in range(3)) * inverse
@@ -86,3 +92,9 @@ class KeptLight(KnownLight):
             weight += counts
         return total / np.maximum(weight, _TINY)[:, None], found >= _LEAST_WEIGHT
 
+    def _add_kept(self, numbers, pixel, points, normals, inverse, total, weight, found) -> None:
+        """See _mean: in one pass over each of the samples."""
+        for number in numbers:
+            kept_points, kept_normals, light, _ = self._samples[number]
+            kernels.call("kept_light", len(light), kept_points, kept_normals, light, self._weights[number], len(pixel), pixel,
+                         points, normals, inverse, total, weight, found)

@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 
 # As in src/library.c: goes up whenever a function's arguments or a structure change.
-VERSION = 2
+VERSION = 3
 # The package of the wheel that carries the library, and the library's name in it.
 PACKAGE = "rtgi_kernels"
 FILE = {"win32": f"{PACKAGE}.dll", "darwin": f"{PACKAGE}.dylib"}.get(sys.platform, f"{PACKAGE}.so")
-# What a function takes, a letter an argument: arrays of float32 (F), float64 (D), int32 (I), int64 (L), bytes or bool (B) and
-# uint32 (U), an address of something else (p), and numbers: int64 (q), int32 (i), float (f), double (d). What it returns comes
-# first (v: nothing).
+# What a function takes, a letter an argument: arrays of float32 (F), float64 (D), float16 (H), int32 (I), int64 (L), bytes or bool
+# (B) and uint32 (U), an address of something else (p), and numbers: int64 (q), int32 (i), float (f), double (d). What it returns
+# comes first (v: nothing).
 SIGNATURES = {
     "intersect": "vpqFFFIFFF",
     "occluded": "vpqFFFB",
@@ -50,10 +50,15 @@ SIGNATURES = {
     "lowest_irradiance": "vqiqDqDDdqqDDD",
     "window_strength": "vqqqDqDqD",
     "project_texels": "vqqqqFqFIFF",
+    "surface_look": "vFiiqFFFFFFFFFFFFF",
+    "sample_reflection": "vqFFFFFFFFFF",
+    "kept_light": "vqFHFfqLFFFFFF",
+    "share_light": "vqqqFFFFBqFFfFF",
     "prepare": "v",
 }
 _NUMBERS = {"q": ctypes.c_int64, "i": ctypes.c_int32, "f": ctypes.c_float, "d": ctypes.c_double}
-_ARRAYS = {"F": ("float32",), "I": ("int32",), "L": ("int64",), "B": ("uint8", "bool"), "U": ("uint32",), "D": ("float64",)}
+_ARRAYS = {"F": ("float32",), "I": ("int32",), "L": ("int64",), "B": ("uint8", "bool"), "U": ("uint32",), "D": ("float64",),
+           "H": ("float16",)}
 _DTYPES = {letter: tuple(np.dtype(name) for name in names) for letter, names in _ARRAYS.items()}
 
 _switched_off = False

@@ -4,7 +4,8 @@ Tolerances: 1e-6 of the greatest value where the arithmetic is the same; 2e-5 wh
 probe's norm for what a whole bake gives: usually some 1e-7, more where a hit on the edge of two texels falls to the other.
 """
 
-from dataclasses import replace
+from dataclasses import fields, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,9 @@ import room_scenes as rooms
 import scene_builders as build
 
 from rtgi_addon import kernels
+from rtgi_addon.effects.frame import GATHERED
+from rtgi_addon.effects.kept_light import KeptLight
+from rtgi_addon.effects.ray_traced.smoothing import smoothed
 from rtgi_addon.numerics import octahedral, sampling, sh
 from rtgi_addon.progress import Progress
 from rtgi_addon.scene import AreaLight, Channel, Material, PointLight, SpotLight, SunLight, Texture
@@ -23,8 +27,10 @@ from rtgi_addon.transport.cache.texels import Focus, TexelLayout
 from rtgi_addon.transport.context import LightContext
 from rtgi_addon.transport.lights.lamps import LampTable
 from rtgi_addon.transport.rays import embree, embree_scene
+from rtgi_addon.transport.surfaces import ggx
 from rtgi_addon.transport.surfaces.geometry import flatten
 from rtgi_addon.transport.surfaces.materials import Surfaces
+from rtgi_addon.transport.vectors import dot, normalized
 
 pytestmark = pytest.mark.skipif(not kernels.is_available(), reason=f"no compiled kernels: {kernels.missing()}")
 traces = pytest.mark.skipif(embree_scene.missing() is not None or not embree.is_available(), reason="no Embree for the kernels")
@@ -236,6 +242,47 @@ def test_probes_are_deringed_alike(order, rng):
     ours, numpys = both(lambda: dering(probes))
     assert np.array_equal(np.any(ours != probes, axis=(1, 2)), np.any(numpys != probes, axis=(1, 2)))
     np.testing.assert_allclose(ours, numpys, atol=2e-5 * np.abs(probes).max())
+
+
+def test_surfaces_reflect_alike(rng):
+    def numbers(*shape):
+        return np.float32(rng.random(shape))
+
+    inputs = [numbers(COUNT, 3), numbers(COUNT, 3), *(numbers(COUNT) for _ in range(4))]
+    for value in (0.0, 1.0):
+        for array in inputs:
+            array[np.flatnonzero(rng.random(COUNT) < 0.1)] = value
+    assert_close(lambda: [getattr(ggx.surface_look(*inputs), item.name) for item in fields(ggx.SurfaceLook)], 2e-5)
+    look = ggx.surface_look(*inputs)
+    normals, towards = (normalized(np.float32(rng.normal(size=(COUNT, 3)))) for _ in range(2))
+    towards = towards * np.copysign(np.float32(1.0), dot(normals, towards))[:, None]
+    towards[:50], towards[50:60] = normals[:50], -normals[50:60]
+    numbers = numbers(COUNT, 2)
+    assert_close(lambda: ggx.sample_reflection(look, normals, towards, numbers), 2e-5)
+
+
+@pytest.mark.parametrize("spacing", [1, 3])
+def test_pixels_share_light_alike(spacing, rng):
+    rows, columns = np.indices((40, 60)).astype(np.float32)
+    normals = normalized(np.stack([np.sin(columns / 9), np.cos(rows / 7), 1 + 0 * rows], axis=-1).reshape(-1, 3)).reshape(40, 60, 3)
+    seen = rng.random((40, 60)) < 0.95
+    gbuffer = SimpleNamespace(position=np.stack([columns, rows, np.sin(columns / 5), 0 * rows], axis=-1),
+                              normal=normals * seen[..., None], seen=seen)
+    frame = SimpleNamespace(gbuffer=gbuffer, footprint=np.full((40, 60), np.float32(0.9)), samples=None, index=3,
+                            irradiance=np.ones((40, 60, 4), np.float32))
+    light, known = np.float32(rng.random((40, 60, 4))), rng.random((40, 60)) < 1.0 / spacing**2
+    assert_close(lambda: [smoothed(frame, light, known, spacing)], 1e-4)
+
+
+def test_kept_light_is_read_alike(rng):
+    kept, numbers = KeptLight(), rng.random((3, 500, 4)).astype(np.float32)
+    normals = normalized(np.float32([0, 0, 2]) + rng.random((500, 3)).astype(np.float32))
+    for part in numbers:
+        gbuffer = SimpleNamespace(position=part, normal=normals, albedo=part)
+        kept.add(SimpleNamespace(kept={GATHERED: part}, gbuffer=gbuffer), 2.0)
+    pixel, width = rng.integers(0, 500, COUNT), np.full(COUNT, 0.5, np.float32)
+    points = numbers[0, pixel, :3]
+    assert_close(lambda: kept._mean(range(3), pixel, points, normals[pixel], width)[:1], 2e-5)
 
 
 def test_arrays_of_another_kind_are_refused():

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ... import kernels
 from ..frame import Frame
 
 # Taps of every pass, as many pixels apart as its step.
@@ -33,13 +34,15 @@ _TINY = np.float32(1e-20)
 class _Places(NamedTuple):
     """What pixels show, each part in planes (h, w), or (n,) of single pixels: ``points`` and ``normals`` by their components,
     one over a pixel's width there [m], and where anything is ``seen``.
-    ``pairs`` tells which have a neighbour so far down and along, and which these are."""
+    ``pairs`` tells which have a neighbour so far down and along, and which these are. ``whole`` are points and normals of a
+    picture (h, w, 3) for the kernel; None where it does not take them."""
 
     points: tuple[np.ndarray, ...]
     normals: tuple[np.ndarray, ...]
     inverse_width: np.ndarray
     seen: np.ndarray
     pairs: Callable[[int, int], tuple]
+    whole: tuple[np.ndarray, np.ndarray] | None = None
 
 
 def smoothed(frame: Frame, light: np.ndarray, known: np.ndarray, spacing: int) -> np.ndarray:
@@ -53,7 +56,10 @@ def smoothed(frame: Frame, light: np.ndarray, known: np.ndarray, spacing: int) -
         light, known, seen, own, width, position, normal = (
             part[whole] for part in (light, known, seen, own, width, position, normal))
     width = np.where(seen, width, np.float32(1.0))
-    places = _Places(_planes(position), _planes(normal), np.float32(1.0) / width, seen, pairs)
+    dense = None
+    if frame.samples is None and kernels.is_available():
+        dense = tuple(np.ascontiguousarray(part[..., :3], np.float32) for part in (position, normal))
+    places = _Places(_planes(position), _planes(normal), (np.float32(1.0) / width).astype(np.float32), seen, pairs, dense)
     steps = [*_STEPS, *(step for step in (8, 16, 32) if step < 2 * spacing)]
     weight = (known & seen).astype(np.float32)
     nearness, found = light[..., 3:], weight
@@ -76,6 +82,14 @@ def _planes(target: np.ndarray) -> tuple[np.ndarray, ...]:
 def _pass(places: _Places, values: np.ndarray, weight: np.ndarray, step: int,
           reach: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
     """``values`` (..., c) that count by ``weight`` (...), averaged over taps ``step`` pixels apart; ``reach`` (...) [m]."""
+    if places.whole is not None:
+        height, width = weight.shape
+        values, weight, inverse = (np.ascontiguousarray(part, np.float32) for part in (values, weight, places.inverse_width))
+        found, counted = np.empty_like(values), np.empty_like(weight)
+        near = None if reach is None else np.ascontiguousarray(reach, np.float32)
+        kernels.call("share_light", height, width, step, *places.whole, inverse, near, np.ascontiguousarray(places.seen),
+                     values.shape[-1], values, weight, float(_ALONE), found, counted)
+        return found, counted
     channels = [np.ascontiguousarray(values[..., channel]) for channel in range(values.shape[-1])]
     own = _KERNEL[1] * _KERNEL[1]
     totals, weights, most = [channel * (weight * own) for channel in channels], weight * own, np.full_like(weight, own)
@@ -98,7 +112,7 @@ def _pass(places: _Places, values: np.ndarray, weight: np.ndarray, step: int,
 
 def _likeness(places: _Places, down: int, along: int, reach: np.ndarray | None) -> np.ndarray:
     """How much (...) light counts that comes to every pixel from the one so far ``down`` and ``along``, in [0, 1]."""
-    points, normals, inverse_width, _, pairs = places
+    points, normals, inverse_width, _, pairs, _ = places
     here, there = pairs(down, along)
     apart = [part[there] - part[here] for part in points]
     alike = np.maximum(sum(part[here] * part[there] for part in normals), np.float32(0.0))

@@ -8,4 +8,5 @@
 #include "ringing.c"
 #include "sampling.c"
 #include "surfaces.c"
+#include "shading.c"
 #include "texels.c"

@@ -7,11 +7,13 @@ one reflection goes where once reflected light goes (Turquin 2019, "Practical Mu
 each time (Kulla and Conty 2017, "Revisiting Physically Based Shading at Imageworks"). So has Cycles it.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from functools import cache
 
 import numpy as np
 
+from ... import kernels
 from ...numerics.sampling import about, sobol_owen
 from ..vectors import dot, normalized
 
@@ -78,6 +80,8 @@ def _visible_normal(view: np.ndarray, alpha: np.ndarray, u: np.ndarray) -> np.nd
     # The view lies in the plane y = 0: the basis is (sideways, up, stretched).
     side = np.array([0.0, 1.0, 0.0])
     up = np.cross(stretched, side)
+    # In tails of the lobe x² + y² is 1 but for float32's last digits.
+    u = u.astype(np.float64)
     radius, angle = np.sqrt(u[:, 0]), 2.0 * np.pi * u[:, 1]
     x = radius * np.cos(angle)
     blend = 0.5 * (1.0 + stretched[..., 2])
@@ -146,6 +150,8 @@ def _dielectric_energy(f0: np.ndarray, cosine: np.ndarray, roughness: np.ndarray
 def surface_look(albedo, base_color, metallic, roughness, specular, view_cosine) -> SurfaceLook:
     """Lambert under a GGX layer as Cycles' Principled BSDF with multiple scattering has it: the twin of include/brdf.glsl. Colours
     (n, 3), the others (n,)."""
+    if kernels.is_available():
+        return _surface_look(albedo, base_color, metallic, roughness, specular, view_cosine)
     specular, metal = np.asarray(specular), metallic[:, None]
     energy = layer_energy(view_cosine, roughness)
     once, mean_once = energy[:, 0] + energy[:, 1], energy[:, 2] + energy[:, 3]
@@ -165,6 +171,20 @@ def surface_look(albedo, base_color, metallic, roughness, specular, view_cosine)
     f0, edge, coat = metal * base_color * more, metal * rise * more, (1 - metallic) * more_coat
     layer = f0 * once[:, None] + edge * energy[:, 1:2] + (coat * dielectric[:, 0])[:, None]
     return SurfaceLook(diffuse, f0, edge, layer, coat, index, np.maximum(roughness * roughness, MIN_ALPHA))
+
+
+def _surface_look(*inputs: np.ndarray) -> SurfaceLook:
+    """See surface_look: in one pass."""
+    n = len(inputs[0])
+    colours, numbers = [np.empty((n, 3), np.float32) for _ in range(4)], [np.empty(n, np.float32) for _ in range(3)]
+    kernels.call("surface_look", energy_table(), SIZE, INDICES, n, *_dense(n, (3, 3, 1, 1, 1, 1), inputs), *colours, *numbers)
+    return SurfaceLook(*colours, *numbers)
+
+
+def _dense(n: int, widths: tuple[int, ...], parts: Iterable[np.ndarray]) -> list[np.ndarray]:
+    """``parts`` as kernels take them: (n, width) float32 each, (n,) of a width of 1."""
+    shapes = [(n,) if width == 1 else (n, width) for width in widths]
+    return [np.ascontiguousarray(np.broadcast_to(part, shape), np.float32) for part, shape in zip(parts, shapes, strict=True)]
 
 
 def reflectance(look: SurfaceLook, normals: np.ndarray, towards_eye: np.ndarray, towards_light: np.ndarray) -> np.ndarray:
@@ -196,6 +216,11 @@ def sample_reflection(look: SurfaceLook, normals: np.ndarray, towards_eye: np.nd
     """Unit directions (n, 3) that the layer reflects to unit ``towards_eye`` (n, 3), drawn by visible normals from ``u`` (n, 2) in
     [0, 1) (Heitz 2018), of mirrors by their own, and weights (n, 3): their mean times radiance is what the layer reflects. A
     direction below the surface weighs nothing."""
+    if kernels.is_available():
+        n, parts = len(normals), (look.f0, look.edge, look.coat, look.index, look.alpha, normals, towards_eye, u)
+        directions, weights = np.empty((2, n, 3), np.float32)
+        kernels.call("sample_reflection", n, *_dense(n, (3, 3, 1, 1, 1, 3, 3, 2), parts), directions, weights)
+        return directions, weights
     cosine = np.clip(dot(normals, towards_eye), 1e-3, 1.0)
     sideways = towards_eye - normals * dot(normals, towards_eye)[:, None]
     length = np.sqrt(dot(sideways, sideways))
