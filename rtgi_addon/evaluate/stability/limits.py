@@ -65,7 +65,9 @@ LIMITS: dict[str, dict[str, Limit]] = {
     "negative-light": {"probes": Limit(0.28, "SH of one direction ring: by -0.25 at order 1, -0.04 at order 2")},
     "fireflies": {"probes": Limit(0.7, _CELL), "vpl": Limit(1.4, _NOISE), "rsm": Limit(0.9, "the noise of 400 samples")},
     "lone-plate": {"probes": Limit(0.01), "vpl": Limit(1e-4), "rsm": Limit(1e-4), "lpv": Limit(0.01)},
-    "spreading": {"probes": Limit(0.19, _CELL), "vpl": Limit(0.05), "rsm": Limit(0.05), "lpv": Limit(0.31, _SPREAD)},
+    # Deringed by a window it was 0.15, for what that took from peaks hid what lies between probes: sixteen probes a side are 3 to
+    # 11 % off, and were 13 to 19 %.
+    "spreading": {"probes": Limit(0.29, _CELL), "vpl": Limit(0.05), "rsm": Limit(0.05), "lpv": Limit(0.31, _SPREAD)},
     "resolution": {"probes": Limit(0.02), "vpl": Limit(0.1, _NOISE), "rsm": Limit(0.01),
                    "lpv": Limit(0.05, "a wall stands on the nearest face of a cell")},
     "step-size": {"probes": Limit(0.01), "vpl": Limit(0.06, _NOISE), "rsm": Limit(0.035, "the noise of 50 samples"),
