@@ -33,7 +33,8 @@ class Point:
     """One setting of one technique, measured with some seeds.
 
     ``label`` says what differs from the defaults; ``default`` is true for the defaults themselves; ``lattice`` multiplies the
-    volumes' resolution; ``accuracy`` is by place (measure.PLACES); ``runs`` are the single bakes as plain values.
+    volumes' resolution; ``accuracy`` is by place (measure.PLACES); ``runs`` are the single bakes as plain values; ``stored`` are
+    the forms that the first can be stored in (Field.stored_forms).
     """
 
     technique: str
@@ -50,6 +51,7 @@ class Point:
     lookup_seconds: float
     accuracy: dict[str, Accuracy]
     runs: tuple[dict, ...]
+    stored: tuple[dict, ...] = ()
 
     def error(self, place: str = "surface") -> float | None:
         """Relative RMSE in ``place``, mean over seeds; None where it was not measured."""
@@ -114,7 +116,8 @@ def point_of(yard: Yard, technique: Technique, runs: list[Run]) -> Point:
         field_bytes=runs[0].field_bytes, lookup_seconds=min(run.lookup_seconds for run in runs),
         accuracy={place: _accuracy(yard, technique, runs, place) for place in runs[0].errors},
         runs=tuple({"seed": run.seed, **asdict(run.costs), "lookup_seconds": run.lookup_seconds,
-                    "errors": {place: asdict(errors) for place, errors in run.errors.items()}} for run in runs))
+                    "errors": {place: asdict(errors) for place, errors in run.errors.items()}} for run in runs),
+        stored=runs[0].stored)
 
 
 def _accuracy(yard: Yard, technique: Technique, runs: list[Run], place: str) -> Accuracy:

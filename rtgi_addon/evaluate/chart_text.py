@@ -28,7 +28,7 @@ def markdown(chart: Chart, pictures: tuple[str, ...] = ()) -> str:
         f"confidence intervals. Times are wall clock on {chart.machine['cores']} cores"
         + (f" with {chart.threads} threads" if chart.threads else "") + ".",
         *(f"![{name}]({name})" for name in pictures),
-        *_techniques(chart), *_known(chart), *_leaks(chart), *_atlas(chart), *_effects(chart),
+        *_techniques(chart), *_known(chart), *_leaks(chart), *_atlas(chart), *_stored(chart), *_effects(chart),
         *left_out,
     ]
     return "\n\n".join(parts).replace("\n\n- ", "\n- ") + "\n"
@@ -177,6 +177,15 @@ def _atlas(chart: Chart) -> list[str]:
             f"At the {chart.receivers['atlas']} of these points that lie on surfaces in the light atlas, under their own normals: "
             "the atlas at several densities, and there each technique's own light.",
             _table(["", "setting (◆ on the Pareto front)", "time", "CPU time", "size [MiB]", "error", "bias"], rows, 2)]
+
+
+def _stored(chart: Chart) -> list[str]:
+    rows = [[point.technique, form["form"], f"{form['bytes_per_probe']:,}", _percent(form["error"])]
+            for point in chart.points for form in point.stored]
+    if not rows:
+        return []
+    return ["## Stored", "What a probe takes in the forms that its light can be stored in, and the relative RMS error of what suns "
+            "from all directions give by them.", _table(["technique", "form", "bytes a probe", "error of suns"], rows, 2)]
 
 
 def _table(heads: list[str], rows: list[list[str]], text_columns: int) -> str:

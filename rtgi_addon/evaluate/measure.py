@@ -71,7 +71,8 @@ class Errors:
 class Run:
     """One bake: ``costs`` of everything `rtgi bake` does but writing, ``lookup_seconds`` for one receiver of the technique's own
     field (wall clock), ``field_bytes`` of what the field keeps, ``errors`` by place and ``estimates``, the arrays behind them;
-    ``lattice`` is the factor of the volumes' resolution; ``baked`` is the field itself."""
+    ``lattice`` is the factor of the volumes' resolution; ``baked`` is the field itself, ``stored`` its forms as plain values
+    (Field.stored_forms), where they were asked for."""
 
     technique: str
     settings: object
@@ -83,6 +84,7 @@ class Run:
     estimates: dict[str, np.ndarray] = field(repr=False)
     baked: Field | None = field(repr=False, default=None)
     lattice: float = 1.0
+    stored: tuple[dict, ...] = ()
 
 
 class Keep(Protocol):

@@ -262,7 +262,7 @@ class _Survey:
             self.left_out.append(f"{method.name}, setting {key[1] + 1}: {about['refused']}")
             return False
         run = Run(method.name, settings, seed, Costs(**about["costs"]), about["lookup_seconds"], about["field_bytes"], {},
-                  estimates, lattice=lattice)
+                  estimates, lattice=lattice, stored=tuple(about.get("stored", ())))
         run = self.yard.compared(run, method)
         if seed == 0 and settings == method.Settings() and lattice == 1.0:
             self.defaults[method.name] = replace(run, baked=field[0] if field else None)
@@ -280,6 +280,8 @@ class _Survey:
         except BakeError as error:
             return {}, {"refused": str(error)}
         about = {"costs": asdict(run.costs), "lookup_seconds": run.lookup_seconds, "field_bytes": run.field_bytes}
+        if seed == 0 and run.baked is not None and settings == method.Settings() and lattice == 1.0:
+            about["stored"] = [asdict(form) for form in run.baked.stored_forms()]
         return run.estimates, about, run.baked
 
 

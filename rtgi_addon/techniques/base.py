@@ -244,6 +244,10 @@ class Field(ABC):
         """The settings of the bake if its light is made of what is drawn, so that it follows objects without one; else None."""
         return None
 
+    def stored_forms(self) -> tuple:
+        """What it takes in the forms that it can be stored in, and what these lose (transfer/stored.py), if it has a choice."""
+        return ()
+
     def light_volumes(self) -> "Field | None":
         """The field as light propagation volumes that engines read beside probes, if it has any."""
         return None

@@ -227,6 +227,8 @@ def test_every_technique_in_a_box(tmp_path):
     assert [point.lattice for point in chart.points if point.technique == "probes"] == [0.5, 1, 1, 1, 1, 1, 1, 2]
     assert best["probes"] < 0.02 and best["vpl"] < 0.1 < best["rsm"]
     assert all(point.cost("peak_bytes") is None or point.cost("peak_bytes") > 0 for point in chart.points)
+    assert {point.technique: point.default for point in chart.points if point.stored} == {"transfer": True}
+    assert "suns by 64 vectors" in (tmp_path / "chart" / "chart.md").read_text()
 
 
 def test_the_light_atlas_is_charted_on_its_surfaces(furnace, offset, tmp_path):

@@ -13,6 +13,7 @@ from .exact import exact_suns
 from .follow import lighting_in
 from .lighting import Lighting
 from .relight import relit
+from .stored import StoredForm, stored_forms
 from .surfaces import require_surfaces
 
 
@@ -48,6 +49,10 @@ class TransferField(ProbeField):
         suns = exact_suns(self.transfer, self.params, scene, progress or Progress())
         grids = relit(self.transfer, replace(lighting, suns=()))
         return self._probes(tuple(replace(grid, sh=grid.sh + light) for grid, light in zip(grids, suns, strict=True)))
+
+    def stored_forms(self) -> tuple[StoredForm, ...]:
+        """See Field."""
+        return stored_forms(self.transfer)
 
     def lit_by(self, lighting: Lighting) -> ProbeField:
         """The probes under other light. Raises UsageError for a group that does not exist."""
