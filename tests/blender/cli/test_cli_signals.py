@@ -76,13 +76,19 @@ def test_nohup_is_respected(tmp_path):
     assert process.returncode == 0 and (tmp_path / "out").is_dir()
 
 
+@unix
 @pytest.mark.slow
 def test_two_bakes_to_one_place_do_not_mix(tmp_path):
     out = tmp_path / "out"
-    slower = ("--set", "pause=3", "--checkpoint-seconds", "0")
+    slower = ("--set", "pause=1", "--checkpoint-seconds", "0")
     first = begin(out, slower)
-    for words in ((), ("--resume",)):
-        assert_failed(bake("--out", out, *words), f"process {first.pid} on ", f"is writing {out} (bake, since 20", "wait until")
+    # However long the others take to start, it is still at it.
+    first.send_signal(signal.SIGSTOP)
+    try:
+        for words in ((), ("--resume",)):
+            assert_failed(bake("--out", out, *words), f"process {first.pid} on ", f"is writing {out} (bake, since 20", "wait until")
+    finally:
+        first.send_signal(signal.SIGCONT)
     first.communicate(timeout=120)
     assert first.returncode == 0
     assert bake("--out", tmp_path / "alone")[0] == 0
