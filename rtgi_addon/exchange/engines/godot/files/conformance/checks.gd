@@ -6,8 +6,8 @@ extends SceneTree
 const MOVED := Transform3D(Vector3(0.36, 0.48, -0.8), Vector3(-0.8, 0.6, 0.0), Vector3(0.48, 0.64, 0.6), Vector3(-3.0, 5.0, 2.0))
 ## The cases' places, and what is added to their names there.
 const PLACES := [[Transform3D.IDENTITY, ""], [MOVED, ", moved"]]
-## Around what a shader shows of `values` in column `column` of a table of points: what a half float holds of each in one row, 2048
-## times the rest in the next.
+## Around what a shader shows of `values` in column `column` of a table of points: what a half float holds of each in one row, to whole
+## steps of 2^-24, 2048 times the rest in the next.
 const SHADER := """shader_type canvas_item;
 render_mode unshaded, blend_disabled;
 #include "%s"
@@ -18,7 +18,8 @@ void fragment() {
 	vec3 values[%d];
 %s
 	int row = int(UV.y * float(2 * values.length()));
-	vec3 high = uintBitsToFloat(floatBitsToUint(values[row / 2]) & uvec3(0xffffe000u));
+	vec3 whole = trunc(values[row / 2] * 16777216.0) / 16777216.0;
+	vec3 high = uintBitsToFloat(floatBitsToUint(whole) & uvec3(0xffffe000u));
 	COLOR = vec4(row %% 2 == 0 ? high : 2048.0 * (values[row / 2] - high), 1.0);
 }
 """
