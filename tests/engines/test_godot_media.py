@@ -11,12 +11,30 @@ from pathlib import Path
 import numpy as np
 import pytest
 from media_bundles import box, even_light, fog, media_bundle, smoke
-from real_godot import complaints, damaged, drawing, drawn, each_renderer, finds, godot, headless, imported, real
+from real_godot import (
+    as_read,
+    complaints,
+    damaged,
+    drawing,
+    drawn,
+    each_renderer,
+    finds,
+    godot,
+    headless,
+    imported,
+    real,
+    same_numbers,
+)
 from scene_builders import transform as moved
 
 from rtgi_addon.exchange import engines
 from rtgi_addon.exchange.engines import ExportSettings
+from rtgi_addon.exchange.engines.axes import Y_UP
+from rtgi_addon.exchange.engines.media import engine_media
+from rtgi_addon.exchange.engines.media_textures import cell_blocks
+from rtgi_addon.exchange.engines.volumes import engine_field
 from rtgi_addon.exchange.exr import read_exr
+from rtgi_addon.scene import DensityGrid, Medium
 
 GODOT = engines.get("godot")
 SCRIPT = "conformance/media.gd"
@@ -53,6 +71,27 @@ def test_without_media_none_of_it(kit_bundle, tmp_path):
     assert "media" not in (report.out / "sample.tscn").read_text()
 
 
+def dim_bundle():
+    """Fog, smoke and a cloud that grows thin, in light of 0.002 W/m^2."""
+    thin = np.exp(-np.linspace(0.0, 14.0, 16, dtype=np.float32))[:, None, None]
+    cloud = DensityGrid(moved((0.0, 0.0, 0.0), (1.5, 1.0, 1.0)), thin)
+    grids = tuple(replace(grid, sh=grid.sh * np.float32(2e-3)) for grid in media_bundle().grids[1:2])
+    cloudy = Medium("Cloud", np.full(3, 5.0), np.full(3, 1.0), grid=cloud)
+    return media_bundle(fog(), replace(smoke(), emission=np.full(3, 1e-5)), cloudy, grids=grids)
+
+
+def test_no_light_and_no_cell_is_below_halves_that_godot_reads(tmp_path):
+    """Godot reads halves below 2^-14 as 0."""
+    bundle = dim_bundle()
+    out = GODOT.export(bundle, tmp_path / "out", ExportSettings(part="files")).out
+    index, media = json.loads((out / "rtgi/media.json").read_text()), engine_media(bundle.media, engine_field(bundle), Y_UP)
+    for entry, wanted in zip([index["ambient"], *index["boxes"]], [media.ambient, *map(cell_blocks, media.boxes)], strict=True):
+        assert np.any((wanted != 0) & (np.abs(wanted) < np.finfo(np.float16).smallest_normal)) or entry.get("name") == "Smoke"
+        same_numbers(as_read(out / "rtgi" / entry["cells"]) * entry["scale"], wanted)
+    said = (out / "rtgi/media_functions.gdshaderinc").read_text()
+    assert f"#define RTGI_AMBIENT_SCALE {index['ambient']['scale']!r}\n" in said
+
+
 @pytest.fixture(scope="module")
 def project(whole):
     return imported(whole.out)
@@ -67,6 +106,13 @@ def test_scripts_agree_without_a_display(project):
 @each_renderer
 def test_shaders_agree(project, options):
     drawn(project, SCRIPT, options, 16)
+
+
+@real
+def test_dim_rooms_and_thin_clouds_agree(tmp_path):
+    project = imported(GODOT.export(dim_bundle(), tmp_path / "dim").out)
+    headless(project, SCRIPT, 8)
+    drawn(project, SCRIPT, ("--rendering-driver", "vulkan"), 16)
 
 
 @real

@@ -4,13 +4,16 @@ RTGI_GODOT is what test_godot.py says it is.
 """
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from real_godot import damaged, drawn, each_renderer, finds, headless, imported, opens, real
+from real_godot import as_read, damaged, drawn, each_renderer, finds, headless, imported, opens, real, same_numbers
 from sphere_bundles import sphere_bundle
 
+from rtgi_addon.effects.spheres.maps import SphereMap, SphereProbes
 from rtgi_addon.exchange import engines
+from rtgi_addon.exchange.engines import ExportSettings
 from rtgi_addon.exchange.exr import read_exr
 
 GODOT = engines.get("godot")
@@ -42,6 +45,25 @@ def test_without_them_none_of_it(kit_bundle, tmp_path):
     assert "sphere" not in (report.out / "rtgi/irradiance.gdshaderinc").read_text()
 
 
+def dim_bundle(*strengths):
+    """Two probes whose light is so many times as strong."""
+    bundle = sphere_bundle()
+    maps = [SphereMap(item.probe, tuple((level * np.float32(factor)).astype(np.float16) for level in item.levels))
+            for item, factor in zip(bundle.spheres.maps, strengths, strict=True)]
+    return replace(bundle, spheres=SphereProbes(maps))
+
+
+def test_no_map_is_dimmer_than_halves_that_godot_reads(tmp_path):
+    """Godot reads halves below 2^-14 as 0."""
+    bundle = dim_bundle(1e-3, 1e3)
+    out = GODOT.export(bundle, tmp_path / "out", ExportSettings(part="files")).out
+    maps, table = as_read(out / "rtgi/spheres/maps.exr"), json.loads((out / "rtgi/spheres.json").read_text())["table"]
+    for number, stack in enumerate(bundle.spheres.stacks):
+        assert number or np.any((stack != 0) & (stack < np.finfo(np.float16).smallest_normal))
+        # Levels below each other, of one probe below the other.
+        same_numbers(maps[number * len(stack):(number + 1) * len(stack)] * table[8 * number + 7][2], stack)
+
+
 @pytest.fixture(scope="module")
 def project(whole):
     return imported(whole.out)
@@ -57,6 +79,13 @@ def test_scripts_agree_without_a_display(project):
 def test_shaders_agree(project, options):
     drawn(project, SCRIPT, options, 8)
     opens(project, options)
+
+
+@real
+def test_dim_rooms_agree(tmp_path):
+    project = imported(GODOT.export(dim_bundle(1e-3, 2e-3), tmp_path / "dim").out)
+    headless(project, SCRIPT, 4)
+    drawn(project, SCRIPT, ("--rendering-driver", "vulkan"), 8)
 
 
 @real

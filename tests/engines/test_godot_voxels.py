@@ -11,11 +11,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from real_godot import complaints, damaged, drawing, drawn, each_renderer, finds, godot, imported, real
+from real_godot import as_read, complaints, damaged, drawing, drawn, each_renderer, finds, godot, imported, real, same_numbers
 from voxel_bundles import lit_voxels, voxel_bundle
 
 from rtgi_addon.errors import BakeError
 from rtgi_addon.exchange import engines
+from rtgi_addon.exchange.engines import ExportSettings
 from rtgi_addon.exchange.engines.axes import Y_UP
 from rtgi_addon.exchange.engines.voxels import engine_voxels
 from rtgi_addon.exchange.exr import read_exr
@@ -63,6 +64,26 @@ def test_more_voxels_than_textures_hold_are_refused():
         engine_voxels(replace(source, tables=replace(source.tables, cells=Many())), Y_UP)
 
 
+def dim_bundle():
+    """Voxels in light of 0.002 W/m^2, of which some let nearly all of it through."""
+    source = lit_voxels()
+    cells, light = source.tables.cells.copy(), source.tables.light.astype(np.float32)
+    cells[1::7, :3] *= np.float16(1e-5)
+    return replace(voxel_bundle(), voxels=replace(source, sky=1e-3 * source.sky, tables=replace(
+        source.tables, cells=cells, light=(1e-3 * light).astype(np.float16))))
+
+
+def test_no_list_has_less_than_halves_that_godot_reads(tmp_path):
+    """Godot reads halves below 2^-14 as 0."""
+    bundle = dim_bundle()
+    out = GODOT.export(bundle, tmp_path / "out", ExportSettings(part="files")).out
+    said = (out / "rtgi/voxels.gdshaderinc").read_text()
+    for name, wanted in (("cells", bundle.voxels.tables.cells), ("light", bundle.voxels.tables.light)):
+        assert np.any((wanted != 0) & (np.abs(wanted) < np.finfo(np.float16).smallest_normal))
+        scale = float(re.search(rf"#define RTGI_VOXEL_{name.upper()}_OVER (\S+)\n", said)[1])
+        same_numbers(as_read(out / f"rtgi/voxels/{name}.exr") * scale, wanted)
+
+
 @pytest.fixture(scope="module")
 def project(whole):
     return imported(whole.out)
@@ -72,6 +93,11 @@ def project(whole):
 @each_renderer
 def test_shaders_agree(project, options):
     drawn(project, SCRIPT, options, 4)
+
+
+@real
+def test_dim_rooms_agree(tmp_path):
+    drawn(imported(GODOT.export(dim_bundle(), tmp_path / "dim").out), SCRIPT, ("--rendering-driver", "vulkan"), 4)
 
 
 @real

@@ -7,7 +7,10 @@ import subprocess
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from rtgi_addon.exchange.exr import read_exr
 
 ROOT = Path(__file__).resolve().parents[2]
 needs_godot = pytest.mark.skipif("RTGI_GODOT" not in os.environ,
@@ -40,6 +43,21 @@ def imported(folder):
     code, said = godot(folder, "--headless", "--import")
     assert code == 0 and not complaints(said), said
     return folder
+
+
+def as_read(path):
+    """The numbers of an .exr as Godot's importer reads them, (height, width, channels) float64: halves below 2^-14 as 0."""
+    planes, _ = read_exr(path)
+    numbers = np.stack([planes[name] for name in sorted(planes, key="RGBA".index)], axis=-1)
+    if numbers.dtype == np.float16:
+        numbers[np.abs(numbers) < np.finfo(np.float16).smallest_normal] = 0.0
+    return numbers.astype(np.float64)
+
+
+def same_numbers(found, wanted):
+    """Hold ``found`` and ``wanted`` to have the same numbers in any order, but for zeros."""
+    found, wanted = (np.sort(values[values != 0]) for values in (np.asarray(found), np.asarray(wanted, np.float64)))
+    assert len(found) == len(wanted) and np.allclose(found, wanted, rtol=1e-12, atol=0.0)
 
 
 def drawing(said):

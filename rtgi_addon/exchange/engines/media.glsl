@@ -1,8 +1,9 @@
 // Media of a bake: what they take, give and scatter at points and along rays. GLSL that Godot's shaders and WebGL have in common;
 // media.py is its twin and says where it is from. Directions are those in which a camera looks.
 //
-// A medium's cells are from 0 to 1: one block is density (in red), three, one after the other in z, are the scattering, absorption
-// and emission. `ambient` has seven blocks of the radiance in SH: red 0-3, red 4-7, green, blue, and the eighths of all three.
+// A medium's cells: one block is density (in red), three, one after the other in z, are the scattering, absorption and emission, that
+// the medium's own are multiplied by. `ambient` has seven blocks of the radiance in SH over RTGI_AMBIENT_SCALE: red 0-3, red 4-7, green,
+// blue, and the eighths of all three.
 
 #define RTGI_THIN 0.01
 
@@ -53,10 +54,10 @@ void rtgi_ambient_bands(sampler3D ambient, vec3 size, vec3 unit_point, vec3 d, o
 	vec3 last = textureLod(ambient, rtgi_in_block(unit_point, size, 6.0, 7.0), 0.0).rgb;
 	vec3 first = 0.4886025 * vec3(d.y, d.z, d.x);
 	vec4 second = vec4(1.0925484 * d.x * d.y, 1.0925484 * d.y * d.z, 0.3153916 * (3.0 * d.z * d.z - 1.0), 1.0925484 * d.x * d.z);
-	band0 = 0.2820948 * vec3(red_low.x, green_low.x, blue_low.x);
-	band1 = vec3(dot(first, red_low.yzw), dot(first, green_low.yzw), dot(first, blue_low.yzw));
-	band2 = vec3(dot(second, red_high), dot(second, green_high), dot(second, blue_high))
-			+ 0.5462742 * (d.x * d.x - d.y * d.y) * last;
+	band0 = RTGI_AMBIENT_SCALE * 0.2820948 * vec3(red_low.x, green_low.x, blue_low.x);
+	band1 = RTGI_AMBIENT_SCALE * vec3(dot(first, red_low.yzw), dot(first, green_low.yzw), dot(first, blue_low.yzw));
+	band2 = RTGI_AMBIENT_SCALE * (vec3(dot(second, red_high), dot(second, green_high), dot(second, blue_high))
+			+ 0.5462742 * (d.x * d.x - d.y * d.y) * last);
 }
 
 // Where along a ray a box lies: brings its begin and end closer to and farther from the ray's own.

@@ -21,9 +21,9 @@ _BOX = (("rtgi_cells_@N@", "sampler3D"), ("rtgi_unit_from_world_@N@", "mat4"), (
         ("rtgi_moments_@N@", "vec2"))
 
 
-def media_functions() -> str:
-    """The functions that any shader of media needs, whatever their number."""
-    return (_HERE / "media.glsl").read_text(encoding="utf-8")
+def media_functions(scale: float = 1.0) -> str:
+    """The functions that any shader of media needs, whatever their number, where the ambient light is stored over ``scale``."""
+    return f"#define RTGI_AMBIENT_SCALE {scale!r}\n\n" + (_HERE / "media.glsl").read_text(encoding="utf-8")
 
 
 def media_shader(media: EngineMedia, sampler: str = "uniform sampler3D {name};", ahead: str = "",

@@ -92,13 +92,16 @@ def notes_on_voxels(voxels: EngineVoxels | None) -> list[str]:
             *(f"voxels in an engine leave out {what}" for what in voxels.source.left)]
 
 
-def voxels_glsl(voxels: EngineVoxels, array: str = "{kind}[{count}]({values})") -> str:
+def voxels_glsl(voxels: EngineVoxels, array: str = "{kind}[{count}]({values})", cells: float = 1.0,
+                light: float = 1.0) -> str:
     """Constants of these voxels, then the functions, for a shader that has ``rtgi_list_texel(sampler, item, parts, part)`` and the
-    samplers rtgi_voxel_rows, rtgi_voxel_cells, rtgi_voxel_light; ``array`` is how its language says one."""
+    samplers rtgi_voxel_rows, rtgi_voxel_cells, rtgi_voxel_light; ``array`` is how its language says one. Lists are stored over
+    ``cells`` and ``light``."""
     tables, (directions, weights, spread) = voxels.source.tables, cone_set(voxels.source.cones)
     defines = {**{name: float(value) for name, value in _NUMBERS.items()}, "VOXEL_LEVELS": len(tables.shapes),
                "VOXEL_CONES": len(weights), "VOXEL_SPREAD": float(spread[0]), "VOXEL_STEP": float(voxels.source.step),
-               "VOXEL_NEAR": float(voxels.source.near)}
+               "VOXEL_NEAR": float(voxels.source.near),
+               "VOXEL_CELLS_OVER": cells, "VOXEL_LIGHT_OVER": light}
     text = "".join(f"#define RTGI_{name} {value!r}\n" for name, value in defines.items())
     resolution = ", ".join(map(str, tables.grid.resolution))
     text += f"#define RTGI_VOXEL_RESOLUTION ivec3({resolution})\n"
@@ -120,6 +123,8 @@ def _include(name: str) -> str:
     text = (_SHADERS / name).read_text(encoding="utf-8")
     text = re.sub(r"^#include .*\n", "", text, flags=re.MULTILINE)
     text = text.replace("indirect.level", "RTGI_VOXEL_LEVEL").replace("indirect.resolution", "RTGI_VOXEL_RESOLUTION")
+    for name in ("cells", "light"):
+        text = text.replace(f"list_texel(voxel_{name},", f"VOXEL_{name.upper()}_OVER * list_texel(voxel_{name},")
     text = re.sub(r"\b(VOXEL|CONE)_(?=[A-Z])", r"RTGI_\1_", text)
     text = re.sub(r"(?<!RTGI_)\b(voxel|cone|list)_(?=[a-z])", r"rtgi_\1_", text)
     return re.sub(r"\b(Voxel|VoxelRay|VoxelsSeen|ConeSample)\b", r"RTGI\1", text)

@@ -3,21 +3,17 @@
 import json
 from pathlib import Path
 
-import numpy as np
-
 from ..atlas import EngineAtlas, atlas_glsl, require_texture
 from ..atlas_transfer import EngineAtlasTransfer, relight_glsl
 from ..base import write_text
 from .media import write_slices
-from .textures import MAX_SIDE
+from .textures import MAX_SIDE, half_scale, over
 
 INDEX, TEXELS = "atlas.json", "atlas/texels.exr"
 RELIT_INDEX, TABLE, SHADER = "atlas_transfer.json", "atlas/transfer.exr", "atlas_relight.gdshader"
 # What goes into a project beside what is written here.
 FILES = ("atlas.gd",)
 _FILES = Path(__file__).parent / "files" / "rtgi"
-# The exponent of what the largest number is stored as at most: Godot reads halves below 2^-14 as 0.
-_LARGEST = 15
 # UV maps that Godot imports of a mesh.
 TEXCOORDS = 2
 _HEAD = """
@@ -62,9 +58,8 @@ def write_atlas(folder: Path, atlas: EngineAtlas, transfer: EngineAtlasTransfer 
     """Write what depends on ``atlas`` and its ``transfer`` into ``folder``. Raises BakeError for what no 3D texture holds,
     OSError."""
     require_texture(atlas, MAX_SIDE, "Godot")
-    # A power of two loses nothing.
-    scale = 2.0 ** min(int(np.frexp(np.abs(atlas.slices).max(initial=0.0))[1]) - _LARGEST, 0)
-    write_slices(folder / TEXELS, (atlas.slices / np.float32(scale)).astype(np.float16), "the light atlas")
+    scale = half_scale(atlas.slices)
+    write_slices(folder / TEXELS, over(atlas.slices, scale), "the light atlas")
     write_text(folder / INDEX, json.dumps({"texels": TEXELS, "scale": scale, "parts": atlas.entries}, indent=1) + "\n")
     if transfer is not None:
         write_slices(folder / TABLE, transfer.slices, "the light atlas's transfer")

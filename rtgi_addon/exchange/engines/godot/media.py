@@ -15,7 +15,7 @@ from ..base import write_text
 from ..media import EngineMedia
 from ..media_shader import media_functions, media_shader
 from ..media_textures import ambient_blocks, cell_blocks
-from .textures import import_record, require_size
+from .textures import half_scale, import_record, over, require_size
 
 INDEX, FOLDER = "media.json", "media"
 # What goes into a project beside what is written here.
@@ -32,20 +32,26 @@ def write_media(folder: Path, media: EngineMedia) -> None:
     """Write all that depends on ``media`` into ``folder``. Raises BakeError for what no 3D texture holds, OSError."""
     nz, ny, nx = media.ambient.shape[:3]
     ambient = f"{FOLDER}/ambient.exr"
-    write_slices(folder / ambient, ambient_blocks(media), "the ambient light of the media")
+    light = ambient_blocks(media)
+    scale = half_scale(light)
+    write_slices(folder / ambient, over(light, scale), "the ambient light of the media")
     boxes = []
     for box in media.boxes:
         name = f"{FOLDER}/{box.folder}.exr"
-        write_slices(folder / name, cell_blocks(box), f"medium {box.name!r}")
-        boxes.append({"name": box.name, "cells": name, "resolution": list(box.resolution), "blocks": len(box.cells),
-                      "unit_from_local": _rows(box.unit_from_world), "scattering": box.scattering.tolist(),
-                      "absorption": box.absorption.tolist(), "emission": box.emission.tolist(), "moments": box.moments.tolist()})
+        cells = cell_blocks(box)
+        held = half_scale(cells)
+        write_slices(folder / name, over(cells, held), f"medium {box.name!r}")
+        boxes.append({"name": box.name, "cells": name, "scale": held, "resolution": list(box.resolution),
+                      "blocks": len(box.cells), "unit_from_local": _rows(box.unit_from_world),
+                      "scattering": box.scattering.tolist(), "absorption": box.absorption.tolist(),
+                      "emission": box.emission.tolist(), "moments": box.moments.tolist()})
     index = {"everywhere": media.fills_space, "extinction": media.extinction.tolist(), "emission": media.emission.tolist(),
              "scattering": media.scattering.tolist(), "anisotropy": anisotropy(media),
-             "ambient": {"cells": ambient, "resolution": [nx, ny, nz], "unit_from_local": _rows(media.ambient_from_world)},
+             "ambient": {"cells": ambient, "scale": scale, "resolution": [nx, ny, nz],
+                         "unit_from_local": _rows(media.ambient_from_world)},
              "boxes": boxes}
     write_text(folder / INDEX, json.dumps(index, indent=1) + "\n")
-    write_text(folder / "media_functions.gdshaderinc", media_functions())
+    write_text(folder / "media_functions.gdshaderinc", media_functions(scale))
     write_text(folder / "media.gdshaderinc", media_shader(media, _SAMPLER, functions='#include "media_functions.gdshaderinc"\n'))
 
 

@@ -3,14 +3,18 @@
 import json
 from pathlib import Path
 
+import numpy as np
+
 from ..base import write_text
 from ..spheres import EngineSpheres, spheres_glsl
 from .media import write_slices
+from .textures import half_scale, over
 
 INDEX, MAPS = "spheres.json", "spheres/maps.exr"
 # What goes into a project beside what is written here.
 FILES = ("spheres.gd",)
-# After the volumes' look-up, which has rtgi_octahedral. Uniforms hold the table: there are 32 probes at most.
+# After the volumes' look-up, which has rtgi_octahedral. Uniforms hold the table: there are 32 probes at most. The third number of a
+# probe's last row is what its map is stored over.
 _HEAD = """\
 // What RTGI's sphere probes saw, for mirrors: spheres.gd sets the uniforms.
 #define RTGI_HAS_SPHERES
@@ -24,7 +28,7 @@ vec4 rtgi_sphere_row(int probe, int row) {{
 }}
 
 vec3 rtgi_sphere_texel(int probe, ivec2 texel) {{
-	return texelFetch(rtgi_sphere_maps, ivec3(texel, probe), 0).rgb;
+	return rtgi_sphere_row(probe, 7).z * texelFetch(rtgi_sphere_maps, ivec3(texel, probe), 0).rgb;
 }}
 
 """
@@ -43,9 +47,12 @@ vec4 rtgi_mirrored(vec3 position_world, vec3 direction_world, float roughness) {
 
 def write_spheres(folder: Path, spheres: EngineSpheres) -> None:
     """Write what depends on ``spheres`` into ``folder``. Raises BakeError for what no 3D texture holds, OSError."""
-    write_slices(folder / MAPS, spheres.slices, "the maps of sphere probes")
+    slices, table = spheres.slices, spheres.table
+    scales = np.array([half_scale(probe) for probe in slices])
+    table[:, 7, 2] = scales
+    write_slices(folder / MAPS, over(slices, scales[:, None, None, None]), "the maps of sphere probes")
     index = {"maps": MAPS, **spheres.sizes, "names": [item.probe.name for item in spheres.probes.maps],
-             "table": spheres.table.reshape(-1, 4).tolist()}
+             "table": table.reshape(-1, 4).tolist()}
     write_text(folder / INDEX, json.dumps(index, indent=1) + "\n")
 
 

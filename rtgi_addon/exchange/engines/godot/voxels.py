@@ -6,6 +6,7 @@ from pathlib import Path
 from ..base import write_text
 from ..voxels import LISTS, EngineVoxels, voxels_glsl
 from .media import write_slices
+from .textures import half_scale, over
 
 INDEX, FOLDER = "voxels.json", "voxels"
 # What goes into a project beside what is written here.
@@ -41,11 +42,15 @@ _SAMPLER = "uniform sampler3D rtgi_voxel_{name} : filter_nearest, repeat_disable
 
 def write_voxels(folder: Path, voxels: EngineVoxels) -> None:
     """Write what depends on ``voxels`` into ``folder``. Raises BakeError for what no 3D texture holds, OSError."""
-    for name, slices in voxels.slices.items():
+    lists = voxels.slices
+    # Light of dim rooms, and opacity where the widest cells hold next to nothing, but perhaps a lamp.
+    scales = {name: half_scale(lists[name]) for name in ("cells", "light")}
+    lists |= {name: over(lists[name], scale) for name, scale in scales.items()}
+    for name, slices in lists.items():
         write_slices(folder / FOLDER / f"{name}.exr", slices, f"the voxels' {name}")
     grid = voxels.source.tables.grid
     index = {"lists": {name: f"{FOLDER}/{name}.exr" for name in LISTS}, "resolution": list(grid.resolution), "cell": grid.cell,
              "cones": voxels.source.cones, "cells_from_local": voxels.cells_from_world[:3].tolist()}
     write_text(folder / INDEX, json.dumps(index, indent=1) + "\n")
     samplers = "".join(_SAMPLER.format(name=name) + "\n" for name in LISTS)
-    write_text(folder / "voxels.gdshaderinc", f"{_HEAD.format(samplers=samplers)}{voxels_glsl(voxels)}{_TAIL}")
+    write_text(folder / "voxels.gdshaderinc", f"{_HEAD.format(samplers=samplers)}{voxels_glsl(voxels, **scales)}{_TAIL}")

@@ -30,6 +30,7 @@ var boxes: Array[Box] = []
 
 class Cells:
 	var texture: Texture3D
+	var scale: float  ## what the numbers of the texture are over
 	var size: Vector3i
 	var blocks: int
 	var unit_from_local: Transform3D
@@ -43,6 +44,10 @@ class Box:
 	var absorption: Vector3
 	var emission: Vector3
 	var moments: Vector2
+
+	## What a shader multiplies by what it reads, or takes as it is where all cells give the same.
+	func emission_of_cells() -> Vector3:
+		return scale * emission if blocks > 1 else emission
 
 
 ## Reads [param folder]/media.json and the textures that it names. An error names what is missing.
@@ -90,9 +95,9 @@ func apply_to(material: ShaderMaterial) -> void:
 		material.set_shader_parameter("rtgi_cells_%d" % number, box.texture)
 		material.set_shader_parameter("rtgi_unit_from_world_%d" % number, Projection(box.unit_from_local * local_from_world))
 		material.set_shader_parameter("rtgi_cells_size_%d" % number, Vector4(box.size.x, box.size.y, box.size.z, box.blocks))
-		material.set_shader_parameter("rtgi_scattering_%d" % number, box.scattering)
-		material.set_shader_parameter("rtgi_absorption_%d" % number, box.absorption)
-		material.set_shader_parameter("rtgi_emission_%d" % number, box.emission)
+		material.set_shader_parameter("rtgi_scattering_%d" % number, box.scale * box.scattering)
+		material.set_shader_parameter("rtgi_absorption_%d" % number, box.scale * box.absorption)
+		material.set_shader_parameter("rtgi_emission_%d" % number, box.emission_of_cells())
 		material.set_shader_parameter("rtgi_moments_%d" % number, box.moments)
 
 
@@ -139,9 +144,9 @@ func fog_volume(box: Box, shader: Shader) -> FogVolume:
 	material.set_shader_parameter("fog_cells", box.texture)
 	material.set_shader_parameter("fog_unit_from_world", Projection(box.unit_from_local * local_from_world))
 	material.set_shader_parameter("fog_cells_size", Vector4(box.size.x, box.size.y, box.size.z, box.blocks))
-	material.set_shader_parameter("fog_scattering", box.scattering)
-	material.set_shader_parameter("fog_absorption", box.absorption)
-	material.set_shader_parameter("fog_emission", box.emission)
+	material.set_shader_parameter("fog_scattering", box.scale * box.scattering)
+	material.set_shader_parameter("fog_absorption", box.scale * box.absorption)
+	material.set_shader_parameter("fog_emission", box.emission_of_cells())
 	material.set_shader_parameter("fog_moments", box.moments)
 	volume.name = box.name.validate_node_name()
 	volume.shape = RenderingServer.FOG_VOLUME_SHAPE_BOX
@@ -256,7 +261,7 @@ static func _texel(cells: Cells, unit: Vector3, block: int) -> Color:
 		var below := slice.get_pixel(low.x, low.y).lerp(slice.get_pixel(high.x, low.y), f.x)
 		var above := slice.get_pixel(low.x, high.y).lerp(slice.get_pixel(high.x, high.y), f.x)
 		layers.append(below.lerp(above, f.y))
-	return layers[0].lerp(layers[1], f.z)
+	return layers[0].lerp(layers[1], f.z) * cells.scale
 
 
 func _open_cells(cells: Cells, entry: Dictionary, folder: String, blocks: int) -> bool:
@@ -265,6 +270,7 @@ func _open_cells(cells: Cells, entry: Dictionary, folder: String, blocks: int) -
 	cells.unit_from_local = Transform3D(columns[0], columns[1], columns[2], columns[3])
 	cells.size = Vector3i(entry["resolution"][0], entry["resolution"][1], entry["resolution"][2])
 	cells.blocks = blocks
+	cells.scale = entry["scale"]
 	cells.texture = load(folder.path_join(entry["cells"])) as Texture3D
 	if cells.texture == null:
 		push_error("RTGI: %s is not imported as Texture3D" % folder.path_join(entry["cells"]))

@@ -131,4 +131,4 @@ func _level(probe: int, level: int, direction: Vector3) -> Vector3:
 	var first := slice.get_pixel(low.x, low.y).lerp(slice.get_pixel(low.x + 1, low.y), f.x)
 	var second := slice.get_pixel(low.x, low.y + 1).lerp(slice.get_pixel(low.x + 1, low.y + 1), f.x)
 	var found := first.lerp(second, f.y)
-	return Vector3(found.r, found.g, found.b)
+	return _row(probe, 7).z * Vector3(found.r, found.g, found.b)
