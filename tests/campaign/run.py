@@ -12,6 +12,7 @@ import signal
 import sys
 import tempfile
 import time
+import traceback
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -71,6 +72,11 @@ def _share(arguments) -> Tally:
     last = 100 * count if name == "kills" else count
     try:
         return run(name, range(first, last, step), seed, place, enough=enough)
+    except Exception:
+        # Raised here, it would have the pool end the other processes, which take that for a wish to stop and go on waiting for work.
+        failed = Tally()
+        failed.findings.append((first, f"the campaign itself failed:\n{traceback.format_exc()}"))
+        return failed
     finally:
         shutil.rmtree(place, ignore_errors=True)
 

@@ -3,6 +3,7 @@
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -36,3 +37,22 @@ def test_a_part_leaves_its_process_to_be_ended_as_before(tmp_path, monkeypatch):
     tally = campaign.run("kills", [1], 0, tmp_path)
     assert tally.counts["trials"] == 1 and handlers == [signal.default_int_handler]
     assert signal.getsignal(signal.SIGTERM) == before
+
+
+@needs_fork
+def test_a_share_that_fails_is_found_and_the_others_end(monkeypatch):
+    """Its error came out of the pool, which ended the other processes; these took it for a wish to stop, and waited for work."""
+    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+    import run as campaign
+
+    class Part:
+        def trial(self, number, tally):
+            if number == 0:
+                raise FileNotFoundError("gone")
+            time.sleep(0.2)
+            tally.count("kills")
+
+    monkeypatch.setattr(campaign, "part_of", lambda name, seed, place: Part())
+    tally = campaign.campaign("kills", 4, 0, 2)
+    assert [number for number, _ in tally.findings] == [0] and "FileNotFoundError: gone" in tally.findings[0][1]
+    assert tally.counts["kills"] == 2
