@@ -73,7 +73,7 @@ def _share(arguments) -> Tally:
     try:
         return run(name, range(first, last, step), seed, place, enough=enough)
     except Exception:
-        # Raised here, it would have the pool end the other processes, which take that for a wish to stop and go on waiting for work.
+        # Raised here, it would have the pool end the other processes, which take that for a wish to stop and wait for more work.
         failed = Tally()
         failed.findings.append((first, f"the campaign itself failed:\n{traceback.format_exc()}"))
         return failed
