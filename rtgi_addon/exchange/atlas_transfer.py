@@ -17,6 +17,7 @@ from ..effects.atlas.matrices import LEAST_SIDE, NUMBERS, AtlasTransfer
 from ..errors import BakeError
 from ..numerics import dome
 from ..storage.parse import file_name, flag, listing, number, record, require_inside, whole
+from ..techniques.transfer.stored import halves
 from .exr import read_exr, require_image, write_exr
 from .flipbook import MAX_SIDE
 from .schema import RESTORE
@@ -24,7 +25,6 @@ from .schema import RESTORE
 _FILES = listing(file_name, NUMBERS)
 TRANSFER = record({"sky_order": whole(0, 8), "sun_side": whole(0, 1024), "sun_below": flag, "lights": whole(0, 1024), "sky": _FILES,
                    "half_error": number(0.0)}, {"suns": _FILES, "light": _FILES})
-_LARGEST_HALF = 65504.0
 
 
 def write_matrices(bundle: Path, folder: str, transfer: AtlasTransfer) -> dict:
@@ -41,10 +41,10 @@ def write_matrices(bundle: Path, folder: str, transfer: AtlasTransfer) -> dict:
     for kind, planes in rounded.items():
         for index, name in enumerate(entry[kind]):
             exact = [plane[:, :, index] for plane in planes]
-            halves = [np.clip(plane, -_LARGEST_HALF, _LARGEST_HALF).astype(np.float16) for plane in exact]
-            off += sum(float(np.square(a.astype(np.float32) - b).sum(dtype=np.float64)) for a, b in zip(halves, exact, strict=True))
+            stored = [halves(plane) for plane in exact]
+            off += sum(float(np.square(a.astype(np.float32) - b).sum(dtype=np.float64)) for a, b in zip(stored, exact, strict=True))
             power += sum(float(np.square(plane).sum(dtype=np.float64)) for plane in exact)
-            _write(bundle / name, "RGBA", halves, transfer, kind, index)
+            _write(bundle / name, "RGBA", stored, transfer, kind, index)
     if entry["lights"]:
         entry["light"] = _names(folder, "lights")
         for index, name in enumerate(entry["light"]):

@@ -41,6 +41,7 @@ from ..storage.writing import write_text
 from ..techniques.base import ProbeGrid
 from ..techniques.transfer.columns import GROUP, SUNS, WORLD
 from ..techniques.transfer.data import Transfer, TransferGrid
+from ..techniques.transfer.stored import halves, table_error
 from ..techniques.transfer.vectors import strongest
 from . import flipbook
 from .exr import read_exr, require_image, write_exr
@@ -51,8 +52,6 @@ SCHEMA = "rtgi-transfer/2"
 FOLDER = "transfer"
 INDEX = f"{FOLDER}/transfer.json"
 WORLD_FILE, VECTORS_FILE = f"{FOLDER}/world.exr", f"{FOLDER}/vectors.exr"
-# The largest number that a half float holds.
-_LARGEST_HALF = 65504.0
 
 _SIZE = whole(1, flipbook.MAX_SIDE)
 _SHEET = record({"cell": listing(_SIZE, 2), "tiles": TILES})
@@ -139,12 +138,8 @@ def read_transfer(bundle, grids: tuple[ProbeGrid, ...]) -> Transfer:
 def _write_vectors(bundle: Path, vectors: np.ndarray, transfer: Transfer) -> dict:
     """Write ``vectors`` (V, K) and return their entry of the index, with the relative RMS ``error`` of suns by them."""
     write_exr(bundle / VECTORS_FILE, {"Y": vectors}, {"schema": SCHEMA, "kind": "vectors"})
-    off = power = 0.0
-    for grid in transfer.grids:
-        for plane in grid.suns:
-            off += float(np.square(plane @ vectors.T @ vectors - plane).sum(dtype=np.float64))
-            power += float(np.square(plane).sum(dtype=np.float64))
-    return {"file": VECTORS_FILE, "count": len(vectors), "error": float(np.sqrt(off / power)) if power else 0.0}
+    error = table_error((grid.suns for grid in transfer.grids), lambda plane: plane @ vectors.T @ vectors)
+    return {"file": VECTORS_FILE, "count": len(vectors), "error": error}
 
 
 def _read_vectors(bundle: Path, index: dict) -> np.ndarray | None:
@@ -168,7 +163,7 @@ class _Rounding:
     def __call__(self, values: np.ndarray) -> np.ndarray:
         if not self._half:
             return np.asarray(values, np.float32)
-        rounded = np.clip(values, -_LARGEST_HALF, _LARGEST_HALF).astype(np.float16)
+        rounded = halves(values)
         self._off += float(np.square(rounded.astype(np.float32) - values).sum(dtype=np.float64))
         self._all += float(np.square(values).sum(dtype=np.float64))
         return rounded

@@ -25,7 +25,7 @@ from .tries import NO_STEP, upper
 USUALLY_LEFT = 0.7
 # Lattices that are baked and fitted at the most, besides the one that does without a fit.
 TRIES = 2
-# Stages of a bake that are not those of its fit.
+# The stage of a bake that is its fit.
 _FIT = "fit"
 
 
@@ -37,15 +37,16 @@ def fit_lattice(pilot: Pilot, found: Found, target: float, planned: Callable[[Re
     rate = float(np.clip(USUAL_RATE if found.rate is None else found.rate, LEAST_RATE, GREATEST_RATE))
     whole, factor, too_coarse = found.reading, 1.0, 0.0
     following = OVERSHOOT * (USUALLY_LEFT * upper(found.error) / target) ** (1.0 / rate)
-    best, fitted = None, {}
+    best, tried_already = None, {whole.resolutions}
     for number in range(TRIES):
         if not too_coarse < following <= NO_STEP * factor:
             break
         resolutions = _coarser(whole.resolutions, following)
-        if resolutions in fitted or resolutions == whole.resolutions:
+        if resolutions in tried_already:
             break
         span = progress.span(number / (TRIES + 1), (number + 1) / (TRIES + 1))
-        tried = fitted[resolutions] = _tried(pilot, pilot.measure(resolutions, span, 0), found, planned, span)
+        tried_already.add(resolutions)
+        tried = _tried(pilot, pilot.measure(resolutions, span, 0), found, planned, span)
         ratio = OVERSHOOT * (upper(tried.error) / target) ** (1.0 / rate)
         if upper(tried.error) <= target:
             best, factor = tried, following

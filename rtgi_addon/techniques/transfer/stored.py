@@ -1,5 +1,6 @@
 """What a table of suns takes in the forms that it can be stored in, and what each loses: halves, and few vectors for many suns."""
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,13 +26,13 @@ def stored_forms(transfer: Transfer) -> tuple[StoredForm, ...]:
     """The forms that ``transfer`` can be stored in, the largest first."""
     directions, tables = len(transfer.sun_directions), [grid.suns for grid in transfer.grids]
     forms = [_form(transfer, "32 bits", False, 0, 0.0),
-             _form(transfer, "16 bits", True, 0, _error(tables, _rounded))]
+             _form(transfer, "16 bits", True, 0, table_error(tables, lambda plane: halves(plane).astype(np.float32)))]
     counts = [count for count in VECTORS if count < directions]
     most = strongest(tables, counts[0]) if counts else None
     for count in counts:
         vectors = most[:count]
         forms.append(_form(transfer, f"16 bits, suns by {count} vectors", True, count,
-                           _error(tables, lambda plane, by=vectors: _rounded(plane @ by.T) @ by)))
+                           table_error(tables, lambda plane, by=vectors: halves(plane @ by.T).astype(np.float32) @ by)))
     return tuple(forms)
 
 
@@ -41,12 +42,14 @@ def _form(transfer: Transfer, name: str, half: bool, vectors: int, error: float)
     return StoredForm(name, size, error)
 
 
-def _rounded(values: np.ndarray) -> np.ndarray:
+def halves(values: np.ndarray) -> np.ndarray:
+    """``values`` as float16, the largest of them where they are beyond."""
     largest = np.finfo(np.float16).max
-    return np.clip(values, -largest, largest).astype(np.float16).astype(np.float32)
+    return np.clip(values, -largest, largest).astype(np.float16)
 
 
-def _error(tables: list[np.ndarray], stored) -> float:
+def table_error(tables: Iterable[np.ndarray], stored: Callable[[np.ndarray], np.ndarray]) -> float:
+    """Relative RMS error of ``tables`` (3, …, K) of suns that are ``stored``(plane (…, K)), over all they hold."""
     off = power = 0.0
     for table in tables:
         for plane in table:
