@@ -39,8 +39,8 @@ CHECK_POINTS, CHECK_NOISE, CHECK_PATHS = 256, 0.05, 1 << 18
 CHECKED = 0.95
 # What makes the receivers of the check others than those of the plan.
 HELD_BACK = 0x68656C64
-# What is baked where nobody names a technique, and the technique whose probes can be fitted to surfaces.
-USUAL = FITTING = "probes"
+# What is baked where nobody names a technique.
+USUAL = "probes"
 # Stages that are not part of what a plan predicts the seconds of.
 _OTHER_STAGES = frozenset({"plan", "extract", "check", "write", "verify", "picture", "fit", "spheres"})
 
@@ -132,10 +132,9 @@ def plan_scene(scene: Scene, target: Target, *, seed: int = 0, threads: int | No
 
 
 def bake_planned(scene: Scene, target: Target, out, *, seed: int = 0, threads: int | None = None, volume=None,
-                 motion: Motion | None = None, check: bool = True, direct: bool = False, fit: bool = False,
+                 motion: Motion | None = None, check: bool = True, direct: bool = False,
                  keep: Callable[[Field], None] | None = None, progress: Progress | None = None, **options) -> PlannedBake:
-    """Plan, bake into ``out`` as planned, and ``check`` the result at receivers that were held back. With ``fit`` probes are
-    fitted to surfaces, and planned so.
+    """Plan, bake into ``out`` as planned, and ``check`` the result at receivers that were held back.
 
     ``keep`` and ``options`` go to bake_scene. The plan is in the bundle's notes. Raises as bake_scene does.
     """
@@ -149,14 +148,9 @@ def bake_planned(scene: Scene, target: Target, out, *, seed: int = 0, threads: i
     kept: list[Field] = []
     # Nobody else takes the place while the plan is made.
     with workplace(check_target(out, inputs=scene.files), "bake") as place:
-        plan = plan_scene(scene, replace(target, fit=target.fit or fit), seed=seed, threads=threads, volume=volume, motion=motion,
-                          others=False, progress=progress.span(0.0, PLANNED_AT)).plan
+        plan = plan_scene(scene, target, seed=seed, threads=threads, volume=volume, motion=motion, others=False,
+                          progress=progress.span(0.0, PLANNED_AT)).plan
         settings = {**plan.settings, **({"direct": True} if direct else {})}
-        if fit and plan.technique != FITTING:
-            raise UsageError(f"the plan is {plan.technique}, which has nothing to fit", "leave out --fit")
-        if fit:
-            # Nested volumes are planned as they are measured.
-            settings["fit"] = True
         with count_rays() as counter:
             names = None if volume is None else [one.name for one in plan.volumes]
             summary = bake_scene(plan.applied(scene), plan.technique, settings, place, seed=seed, threads=threads, volume=names,

@@ -37,8 +37,12 @@ def cost(plan: Plan) -> str:
     """Time on this machine, memory, and what the bundle takes before it is compressed."""
     price, order = plan.chosen.price, int(plan.settings.get("order", 2))
     disk = 4 * plan.probes * (3 * (order + 1) ** 2 + 2 * VISIBILITY_RESOLUTION**2 + _OTHERS)
-    return (f"{spoken(price.seconds)} on this machine, {price.bytes / _MIB:,.0f} MiB of memory, "
-            f"at most {max(disk / _MIB, 0.1):,.1f} MiB on disk")
+    made, memory, most = plan.found.finished, f"{price.bytes / _MIB:,.0f}", f"{max(disk / _MIB, 0.1):,.1f}"
+    if made is not None:
+        # That of the bake which was made to plan it.
+        return (f"{spoken(price.seconds)} on this machine and {spoken(made.fit_seconds)} for the fit, {memory} MiB of memory, "
+                f"at most {most} MiB on disk")
+    return f"{spoken(price.seconds)} on this machine, {memory} MiB of memory, at most {most} MiB on disk"
 
 
 def by_rays(plan: Plan) -> str:

@@ -7,7 +7,8 @@ import pytest
 import scene_builders as build
 
 from rtgi_addon import techniques
-from rtgi_addon.evaluate.plan import Target, make_plan
+from rtgi_addon.evaluate.plan import Target, choice, make_plan
+from rtgi_addon.evaluate.plan.nesting import Box, nested_volume
 from rtgi_addon.evaluate.plan.sample import draw_sample
 from rtgi_addon.evaluate.references import PathReference
 from rtgi_addon.progress import Progress
@@ -67,3 +68,25 @@ def test_where_a_fit_brings_nothing_the_lattice_stays_and_its_own_error_is_told(
     assert plan.found.reading is plan.found.measured and plan.settings["fit"]
     assert "no coarser lattice that was tried does" in " ".join(plan.reasons)
     assert plan.chosen.error.value == pytest.approx(plan.found.reading.error(plan.found.order, plan.found.ray_error).value, rel=0.4)
+
+
+def test_volumes_in_volumes_are_fitted_with_those_that_they_lie_in(monkeypatch):
+    """A box of finer cells in half of a coarse lattice, as if one had been found to pay."""
+    def nest(pilot, found, *_):
+        base = replace(found.reading.volumes[0], resolution=(6, 3, 3))
+        boxed = (base, nested_volume(base, Box((0, 0, 0), (3, 3, 3), 0.5), "Volume fine 1"))
+        reading = pilot.measure_volumes(boxed, Progress(), 1)
+        return replace(found, reading=reading, error=reading.error(found.order, found.ray_error), nesting="nested",
+                       single=found.reading)
+
+    monkeypatch.setattr(choice, "nest", nest)
+    scene = chambers()
+    plan = make_plan(scene, Target(0.12, fit=True), others=False, points=512, threads=1)
+    coarse, fine = plan.volumes
+    nested = plan.found.measured.lattice_points
+    assert plan.settings["fit"] and plan.met and fine.planned == coarse.name and plan.probes < nested
+    assert any(line.startswith(f"Nested so, {nested} probes") for line in plan.reasons)
+    planned, method = plan.applied(scene), techniques.get("probes")
+    field = method.bake(planned, method.Settings(**plan.settings), np.random.default_rng(0), Progress(), threads=1,
+                        begun=plan.found.reading.pilot.begun)
+    assert field is plan.found.finished.field and len(field.grids()) == 2

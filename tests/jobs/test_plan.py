@@ -98,7 +98,7 @@ def test_direct_light_cannot_be_checked(tmp_path):
 
 
 def test_a_planned_bake_can_be_fitted(tmp_path):
-    done = bake_planned(room(resolution=(3, 3, 3)), Target(0.3), tmp_path / "bundle", fit=True, check=False, threads=1)
+    done = bake_planned(room(resolution=(3, 3, 3)), Target(0.3, fit=True), tmp_path / "bundle", check=False, threads=1)
     assert done.plan.settings["fit"] and done.bake.settings["fit"] and len(done.bake.stats["fits"]) == 1
     assert any(reason.startswith("Fitted to surfaces") for reason in done.plan.reasons) and ", fit on " in done.to_text()
 

@@ -160,8 +160,8 @@ def _run(arguments: argparse.Namespace, session: Session) -> Report:
     elif arguments.technique == PLANNED:
         done = bake_planned(
             scene, target_of(arguments), arguments.out, seed=arguments.seed, threads=arguments.threads, volume=arguments.volume,
-            motion=find_motion(), check=not arguments.no_check, direct=bool(arguments.direct), fit=bool(arguments.fit),
-            resume=arguments.resume, checkpoint_seconds=arguments.checkpoint_seconds, picture=arguments.picture, progress=progress,
+            motion=find_motion(), check=not arguments.no_check, direct=bool(arguments.direct), resume=arguments.resume,
+            checkpoint_seconds=arguments.checkpoint_seconds, picture=arguments.picture, progress=progress,
             spheres=sphere_settings(arguments), atlas=atlas_settings(arguments))
     else:
         done = bake_scene(

@@ -65,7 +65,7 @@ def target_of(arguments: argparse.Namespace) -> Target:
     """What the command line asks for."""
     error = Target.error if arguments.error is None else arguments.error
     orders = Target.orders if arguments.order is None else (arguments.order,)
-    return Target(error, arguments.memory, arguments.most_probes, orders, arguments.keep_air, arguments.nested)
+    return Target(error, arguments.memory, arguments.most_probes, orders, arguments.keep_air, arguments.nested, bool(arguments.fit))
 
 
 def memory(text: str) -> float:
@@ -81,6 +81,8 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--error", type=float, metavar="E", help=f"relative error at surfaces (default {Target.error:g})")
     parser.add_argument("--order", type=at_least(0), metavar="L", help="SH order (default: 1 or 2, whichever is cheaper)")
     add_target(parser)
+    parser.add_argument("--fit", action="store_true",
+                        help="plan probes that are fitted to how surfaces and moving things read them, as few as that allows")
     add_strict(parser, "")
     parser.add_argument("--volume", action="append", metavar="NAME", help="plan only this volume; may be repeated")
     parser.add_argument("--apply", metavar="FILE.blend", help="also save a copy of the file with the plan written into it")
@@ -102,8 +104,11 @@ class Applied:
         return {**self.report.to_json(), "applied": str(self.file)}
 
     def to_text(self) -> str:
-        """That of the report, and where it was written."""
-        return f"{self.report.to_text()}\n{as_lines([f'The plan is written into {self.file}.'])}"
+        """That of the report, where it was written, and the options that bake it so here: a file's settings are its panel's."""
+        options = " ".join(f"--{name}" if value is True else f"--{name} {value:g}" for name, value in self.plan.settings.items())
+        said = f"The plan is written into {self.file}. Its panel bakes it as planned, and so does bake with --technique " \
+               f"{self.plan.technique} {options}."
+        return f"{self.report.to_text()}\n{as_lines([said])}"
 
 
 def _applied(report: Report, out: Path) -> Applied:

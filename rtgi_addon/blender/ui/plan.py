@@ -63,6 +63,8 @@ class RTGI_OT_plan(ModalJob, bpy.types.Operator):
                                      "through the air", default=False)
     nested: bpy.props.BoolProperty(name="Nested Volumes", description="Look for finer volumes within coarser ones that do as well "
                                    "with fewer probes, even where that takes longer than it saves", default=False)
+    fit: bpy.props.BoolProperty(name="Fit to Surfaces", description="Plan probes that are fitted to how surfaces and moving things "
+                                "read them, as few as that allows", default=False)
     others: bpy.props.BoolProperty(name="Compare Techniques", description="Also measure what the other techniques would do",
                                    default=True)
 
@@ -73,7 +75,7 @@ class RTGI_OT_plan(ModalJob, bpy.types.Operator):
 
     def _work(self, context):
         extracted, motion = extract_scene(context=context), find_motion(context)
-        target = Target(self.error, self.memory * _MIB or None, keep_air=self.keep_air, nested=self.nested)
+        target = Target(self.error, self.memory * _MIB or None, keep_air=self.keep_air, nested=self.nested, fit=self.fit)
         seed, others = context.scene.rtgi.seed, self.others
 
         def plan(progress: Progress) -> PlanReport:
@@ -182,7 +184,7 @@ def rows(plan: Plan) -> list[tuple[bool, str, str, str]]:
              spoken(option.price.seconds)) for option in shown]
 
 
-SETTINGS = ToolSettings("rtgi_plan", RTGI_OT_plan, ("error", "memory", "keep_air", "nested", "others"))
+SETTINGS = ToolSettings("rtgi_plan", RTGI_OT_plan, ("error", "memory", "keep_air", "nested", "fit", "others"))
 _CLASSES = (RTGI_OT_plan, RTGI_OT_cancel_plan, RTGI_OT_apply_plan, RTGI_PT_plan, RTGI_PT_plan_reasons, RTGI_PT_plan_options)
 
 

@@ -57,7 +57,7 @@ class Target:
     reads them; ``memory`` bytes that the bake may take (None: any); ``probes`` that the lattices may have together. ``orders`` are
     the SH orders to choose from; ``keep_air`` keeps probes that no surface reads, for things that move through the air;
     ``nested`` has finer volumes looked for within coarser ones whatever that takes, which is done anyway where it takes little of
-    the bake; ``fit`` has probes fitted to surfaces, on as coarse a lattice as that allows."""
+    the bake; ``fit`` has probes fitted to surfaces, on as coarse lattices as that allows, and no other technique chosen."""
 
     error: float = 0.05
     memory: float | None = None
@@ -163,7 +163,7 @@ def make_plan(scene: Scene, target: Target, *, seed: int = 0, threads: int | Non
         found = nest(pilot, found, target.error, lambda volumes, order: _limit(prices, target, volumes, order),
                      lambda rays: target.nested or (large and search.may_spend(rays, found)), searched.span(_SINGLE, 1.0))
         keep_air = target.keep_air or bool(look.motion.objects)
-        if target.fit and len(found.reading.volumes) == len(scene.volumes):
+        if target.fit:
             found = fit_lattice(pilot, found, target.error,
                                 lambda reading: _volumes(context, reading, sample, scene.volumes, keep_air),
                                 progress.span(_FOUND, _FOUND_ALONE))
@@ -250,7 +250,8 @@ def _options(pilot: Pilot, prices: Prices, found: Found, measured: list[Measured
         price = Price(rays, seconds, prices.bytes(planned.volumes, found.order, 0.0))
         option = Option(other.technique, "defaults", planned.resolutions, error, price,
                         not other.why_not and upper(error) <= target.error, other.why_not)
-        if option.meets and price.rays < chosen.price.rays:
+        # Nothing else can be fitted.
+        if option.meets and price.rays < chosen.price.rays and not target.fit:
             rest.insert(0, chosen)
             chosen = replace(option, label="planned")
         else:

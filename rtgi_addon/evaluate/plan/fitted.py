@@ -3,6 +3,7 @@
 What a fit brings differs from scene to scene and from spacing to spacing: on two rooms it left 0.53 to 0.66 of the error of
 lattices of 60 to 1,000 probes, and all of it at 2,000 to 5,000. So it is not foretold. The lattice is baked and fitted, and held
 to receivers that the fit did not see; the bake that is planned in the end is the one that was tried, and is not made again.
+Volumes within others become coarser as those do: which box each of them is stays what it was planned as.
 """
 
 from collections.abc import Callable
@@ -41,12 +42,13 @@ def fit_lattice(pilot: Pilot, found: Found, target: float, planned: Callable[[Re
     for number in range(TRIES):
         if not too_coarse < following <= NO_STEP * factor:
             break
-        resolutions = _coarser(whole.resolutions, following)
+        volumes = _coarser(whole.volumes, following)
+        resolutions = tuple(tuple(volume.resolution) for volume in volumes)
         if resolutions in tried_already:
             break
         span = progress.span(number / (TRIES + 1), (number + 1) / (TRIES + 1))
         tried_already.add(resolutions)
-        tried = _tried(pilot, pilot.measure(resolutions, span, 0), found, planned, span)
+        tried = _tried(pilot, pilot.measure_volumes(volumes, span, 0), found, planned, span)
         ratio = OVERSHOOT * (upper(tried.error) / target) ** (1.0 / rate)
         if upper(tried.error) <= target:
             best, factor = tried, following
@@ -59,8 +61,9 @@ def fit_lattice(pilot: Pilot, found: Found, target: float, planned: Callable[[Re
     return replace(best, met=upper(best.error) <= target, measured=whole)
 
 
-def _coarser(resolutions, factor: float):
-    return tuple(tuple(max(min(2, count), round(count * factor)) for count in resolution) for resolution in resolutions)
+def _coarser(volumes: tuple[ProbeVolume, ...], factor: float) -> tuple[ProbeVolume, ...]:
+    return tuple(replace(volume, resolution=tuple(max(min(2, count), round(count * factor)) for count in volume.resolution))
+                 for volume in volumes)
 
 
 def _tried(pilot: Pilot, reading: Reading, found: Found, planned, progress: Progress) -> Found:
@@ -71,11 +74,12 @@ def _tried(pilot: Pilot, reading: Reading, found: Found, planned, progress: Prog
     with count_rays() as counter:
         field = techniques.get("probes").bake(scene, settings, np.random.default_rng(pilot.seed), own,
                                               threads=pilot.context.threads, begun=pilot.begun)
-    seconds = sum(taken for stage, taken in own.finish().items() if stage != _FIT)
+    stages = own.finish()
+    fit_seconds = stages.pop(_FIT, 0.0)
     # Those by which the lattice that does without was decided upon: others may be harder.
     receivers = pilot.sample.receivers.take(slice(0, len(found.reading.variance)))
     figure = pilot.sample.error(field.irradiance(receivers.points, receivers.normals), pilot.truth)
     value = float(np.hypot(figure.value, CACHE_SHARE * found.ray_error))
     error = Figure(value, figure.standard_error * (figure.value / value if value > 0 else 1.0))
-    finished = Finished(scene.volumes, settings, pilot.bake_seed, field, seconds, counter.rays)
+    finished = Finished(scene.volumes, settings, pilot.bake_seed, field, sum(stages.values()), counter.rays, fit_seconds)
     return replace(found, reading=reading, error=error, fitted=True, finished=finished)

@@ -85,7 +85,8 @@ def _nesting(found: Found, volumes) -> list[str]:
     lines = [f"{volume.name!r}, {size([volume.resolution])} probes within {volume.planned!r}, lies where most of the error was."
              for volume in volumes if volume.planned]
     if found.single is not None:
-        lines.append(f"Nested so, {found.reading.lattice_points:,} probes do what takes {found.single.lattice_points:,} without.")
+        nested = found.measured or found.reading
+        lines.append(f"Nested so, {nested.lattice_points:,} probes do what takes {found.single.lattice_points:,} without.")
     return lines
 
 

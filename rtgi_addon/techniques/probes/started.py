@@ -79,8 +79,8 @@ class StartedProbes:
 
 @dataclass(frozen=True, eq=False)
 class Finished:
-    """A bake of ``volumes`` with ``settings`` and ``seed`` that was made to see how good it is: its ``field``, and what it took
-    without its fit (``seconds``) and with it (``rays``)."""
+    """A bake of ``volumes`` with ``settings`` and ``seed`` that was made to see how good it is: its ``field``, what it took
+    without its fit (``seconds``) and with it (``rays``), and the fit alone (``fit_seconds``)."""
 
     volumes: tuple[ProbeVolume, ...]
     settings: ProbeSettings
@@ -88,6 +88,7 @@ class Finished:
     field: Field
     seconds: float
     rays: int
+    fit_seconds: float
 
     def is_of(self, volumes: tuple[ProbeVolume, ...], settings: ProbeSettings, seed: int) -> bool:
         """Whether it is the bake of ``volumes`` with ``settings`` and ``seed``."""

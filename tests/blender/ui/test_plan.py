@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -142,14 +143,17 @@ def test_a_plan_is_undone_as_one_step(lit_room):
 
 def test_the_command_line_saves_a_copy_with_the_plan_in_it(tmp_path):
     out = tmp_path / "planned.blend"
-    code, text, err = run(CORNELL, "plan", "--error", "0.2", "--probes-only", "--json", "--apply", out)
+    code, text, err = run(CORNELL, "plan", "--error", "0.2", "--probes-only", "--fit", "--apply", out)
     assert code == 0, err
-    plan = json.loads(text)
-    assert plan["applied"] == str(out)
-    code, text, err = run(out, "bake", "--out", tmp_path / "bake", "--json")
+    said = " ".join(text.split())
+    assert f"The plan is written into {out}" in said and "Fitted to surfaces" in said and " for the fit, " in said
+    options = re.search(r"does bake with (--technique probes (.*) --fit)\.", said).group(1).split()
+    code, text, err = run(out, "bake", "--out", tmp_path / "bake", "--json", *options)
     assert code == 0, err
     baked = json.loads(text)
-    assert [volume["resolution"] for volume in baked["volumes"]] == [volume["resolution"] for volume in plan["volumes"]]
+    planned = " x ".join(map(str, baked["volumes"][0]["resolution"]))
+    assert re.search(rf"Planned: probes with order {baked['settings']['order']}, error [0-9.]+, fit on [^:]* {planned}: ", said)
+    assert baked["settings"]["fit"]
     code, _, err = run(CORNELL, "plan", "--error", "0.2", "--apply", CORNELL)
     assert code != 0 and "--apply" in err, err
 
@@ -168,7 +172,7 @@ def test_the_panel_shows_the_reasons_and_what_else_there_is(lit_room):
         return layout.texts, layout.shown
 
     said, shown = drawn("RTGI_PT_plan")
-    assert shown == ["error", "memory", "keep_air", "nested", "others", "rtgi.plan", "rtgi.apply_plan"]
+    assert shown == ["error", "memory", "keep_air", "nested", "fit", "others", "rtgi.plan", "rtgi.apply_plan"]
     assert len(said) == 3 and "light on surfaces off by" in said[1] and "MiB of memory" in said[2]
     assert "The scene is enclosed" in " ".join(drawn("RTGI_PT_plan_reasons")[0])
     assert rows(plan)[0][1] in drawn("RTGI_PT_plan_options")[0]

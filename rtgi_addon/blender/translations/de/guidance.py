@@ -15,6 +15,8 @@ LABELS: dict[str, str] = {
     "Nested Volumes": "Volumen in Volumen",
     "Look for finer volumes within coarser ones that do as well with fewer probes, even where that takes longer than it saves":
         "Nach feineren Volumen in gröberen suchen, die mit weniger Sonden ebenso gut sind, auch wo das länger dauert, als es spart",
+    "Plan probes that are fitted to how surfaces and moving things read them, as few as that allows":
+        "Sonden planen, die daran angepasst sind, wie Flächen und Bewegtes sie lesen, so wenige, wie das erlaubt",
     "Only Near Surfaces": "Nur nahe Flächen",
     "Trace no rays from probes that no surface reads. Things that move far from surfaces are then lit by what those near them have":
         "Von Sonden, die keine Fläche liest, keine Strahlen verfolgen. Was sich fern von Flächen bewegt, wird dann von dem "
@@ -55,6 +57,8 @@ MESSAGES: dict[str, str] = {
         "Licht auf Flächen um {0} daneben, unter {1} mit {2} % Sicherheit",
     "within the {0} asked for": "innerhalb der verlangten {0}",
     "the best there is, {0} is out of reach": "das Beste, was es gibt, {0} ist unerreichbar",
+    "{0} on this machine and {1} for the fit, {2} MiB of memory, at most {3} MiB on disk":
+        "{0} auf dieser Maschine und {1} für die Anpassung, {2} MiB Speicher, höchstens {3} MiB auf der Platte",
     "{0} on this machine, {1} MiB of memory, at most {2} MiB on disk":
         "{0} auf dieser Maschine, {1} MiB Speicher, höchstens {2} MiB auf der Platte",
 

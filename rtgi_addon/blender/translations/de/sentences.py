@@ -328,8 +328,6 @@ SENTENCES: dict[str, str] = {
         "Backen planen)",
     "fitting probes to surfaces": "Sonden an Flächen anpassen",
     "add --no-check": "--no-check hinzufügen",
-    "the plan is {0}, which has nothing to fit": "der Plan ist {0}, da gibt es nichts anzupassen",
-    "leave out --fit": "--fit weglassen",
 
     # Exports.
     "{0} is brighter than half floats hold ({1} W/(sr m^2))": "{0} ist heller, als halbe Gleitkommazahlen fassen ({1} W/(sr m^2))",
