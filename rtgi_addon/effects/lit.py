@@ -14,6 +14,7 @@ from ..numerics.sampling import sobol_owen_at
 from ..scene import Scene
 from ..scene.lights import lamps_to_add
 from ..techniques.base import Field
+from ..techniques.lattice.near_light import near_light
 from ..transport.context import LightContext
 from ..transport.lights.world_sh import unshadowed_irradiance
 from ..transport.rays.tracer import offset_origins, short_of
@@ -76,7 +77,7 @@ def _arriving(context: LightContext | None, field: Field | None, gbuffer: GBuffe
     if context is not None:
         held = frozenset() if field is None else field.direct_lamps
         direct[gbuffer.seen] = direct_light(context, gbuffer, view, index, lamp_points, held)
-        irradiance[gbuffer.seen, :3] = indirect_irradiance(context.scene, field, gbuffer)
+        irradiance[gbuffer.seen, :3] = indirect_irradiance(context, field, gbuffer, index)
     return direct, irradiance
 
 
@@ -141,10 +142,12 @@ def _seen_surfaces(gbuffer: GBuffer, view: CameraView) -> SeenSurfaces:
     return SeenSurfaces(points, normals, faces, towards_eye, look)
 
 
-def indirect_irradiance(scene: Scene, field: Field | None, gbuffer: GBuffer) -> np.ndarray:
+def indirect_irradiance(context: LightContext, field: Field | None, gbuffer: GBuffer, index: int | np.ndarray = 0) -> np.ndarray:
     """Irradiance (n, 3) [W·m⁻²] of ``field`` at the n pixels in ``gbuffer.seen``, of its light atlas where the surface is in it; of
-    the world's own light for None."""
+    the world's own light for None. What emissive surfaces give others closer than probes are apart is that of the sample number
+    ``index`` of the picture, or (n,) each its own (techniques/lattice/near_light.py)."""
     points, normals = gbuffer.position[gbuffer.seen][:, :3], gbuffer.normal[gbuffer.seen][:, :3]
+    scene = context.scene
     if field is None:
         return unshadowed_irradiance(scene.world, normals)
     result, elsewhere = np.zeros((len(points), 3), np.float32), np.ones(len(points), bool)
@@ -153,8 +156,14 @@ def indirect_irradiance(scene: Scene, field: Field | None, gbuffer: GBuffer) -> 
         rows, places = atlas.find(gbuffer.primitive[gbuffer.seen], gbuffer.instance[gbuffer.seen], points,
                                   gbuffer.geometry[gbuffer.seen][:, :3])
         result[rows], elsewhere[rows] = field.atlas.read(places, normals[rows]), False
-    if elsewhere.any():
-        result[elsewhere] = np.maximum(field.irradiance(points[elsewhere], normals[elsewhere]), 0.0)
+    if not elsewhere.any():
+        return result
+    near, points, normals = near_light(context, field), points[elsewhere], normals[elsewhere]
+    light = np.maximum((field if near is None else near.left).irradiance(points, normals), 0.0)
+    if near is not None:
+        faces = gbuffer.geometry[gbuffer.seen][:, :3][elsewhere]
+        light += near.irradiance(context, points, normals, faces, index if np.ndim(index) == 0 else index[elsewhere])
+    result[elsewhere] = light
     return result
 
 

@@ -183,6 +183,14 @@ DIRECT_LIGHT_IN_MEDIA = replace(
     DIRECT_LIGHT, uniforms=(*DIRECT_LIGHT.uniforms, ("media", UniformStruct("MediaCount", (("int", "count"),)))),
     samplers=(*DIRECT_LIGHT.samplers, "media_table", "media_cells"), defines=(*DIRECT_LIGHT.defines, ("IN_MEDIA", "1")))
 
+# What a flat piece of an emissive surface gives, through one shadow map.
+NEAR_LIGHT = Program(
+    "near_light", uniforms=(("pane", UniformStruct("NearPane", (
+        ("vec4", "corners", 4), ("vec3", "normal"), ("float", "area"), ("vec3", "radiance"), ("int", "width"), ("vec3", "point"),
+        ("int", "height")))), ("shadow", SHADOW)),
+    samplers=("shadow_map", *(f"gbuffer_{name}" for name in ("position", "normal", "geometry"))),
+    images=(Image("irradiance", access="READ_WRITE"),), local_size=_GROUP)
+
 FILM = Program(
     "film", uniforms=(("film", FILM_FRAME),),
     samplers=("world", "direct_radiance", "indirect_irradiance",

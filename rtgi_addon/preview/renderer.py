@@ -10,10 +10,12 @@ import numpy as np
 from ..effects import Chosen, concerned, in_order
 from ..effects.atlas.relight import STALE_ATLAS
 from ..effects.atlas.sheet import LightAtlas
+from ..effects.lit import light_context
 from ..effects.spheres.maps import SphereProbes
 from ..scene import Instance, Material, Mesh, Scene
 from ..scene.lights import NOT_AT_ALL, lamps_to_add
 from ..techniques.base import Field, validate_settings
+from ..techniques.lattice.near_light import NearLight, may_have_near_light, near_light
 from ..transport.context import changed_surfaces, same_values
 from ..transport.views.camera import CameraView
 from ..transport.views.drawn_instances import seen_by_cameras
@@ -29,6 +31,7 @@ from .indirect import FRAME_SAMPLES, make_indirect
 from .indirect_pass import Indirect, draw_indirect
 from .light_atlas import AtlasLight
 from .materials import Images
+from .near_light import NearPass
 from .settings import PASSES, PreviewSettings
 from .surfaces import SurfacePass
 from .textures import download, empty
@@ -56,7 +59,9 @@ class PreviewRenderer:
         self._background = Background(scene.world)
         self._lamps = DirectLight(self.settings)
         self._baked = baked or scene
-        self._indirect: Indirect = make_indirect(field, self._baked, samples=FRAME_SAMPLES, live=live)
+        near = _near_light(self._baked, field)
+        self._near = None if near is None else NearPass(near, self.settings)
+        self._indirect: Indirect = make_indirect(field, self._baked, samples=FRAME_SAMPLES, live=live, near=near)
         if self._indirect.captures and (field is None or self._baked is not scene):
             self._capture()
         self._lit_as_baked, self._atlas_light = True, AtlasLight()
@@ -145,6 +150,7 @@ class PreviewRenderer:
         validate_settings(settings)
         if replace(settings, samples=self.settings.samples, mode=self.settings.mode) != self.settings:
             self._lamps = DirectLight(settings)
+            self._near = None if self._near is None else NearPass(self._near.near, settings)
         if tuple(passes) != self._passes:
             self._film = None
         self._effects = in_order(effects)
@@ -224,6 +230,8 @@ class PreviewRenderer:
             self._lamps.draw(self.scene, added, self._surfaces, self._bounds, view, index, inputs, self._direct)
         self._put_in(view, index)
         draw_indirect(self._indirect, inputs, self._irradiance)
+        if self._near is not None and self._surfaces is not None:
+            self._near.draw(self.scene, self._surfaces, self._bounds, index, inputs, self._irradiance)
         self._atlas_light.draw(self._atlas, self.scene, self._gbuffer.textures, self._irradiance)
         self._film.add(view, offset, inputs, self._background, self.settings.film_transparent,
                        partial(self._with_effects, offset) if self._halves else None)
@@ -258,6 +266,14 @@ class PreviewRenderer:
         self._gbuffer = GBuffer(*size)
         self._direct, self._irradiance = empty(*size), empty(*size)
         self._before = None
+
+
+def _near_light(scene: Scene, field: Field | None) -> NearLight | None:
+    """See techniques.lattice.near_light; rays are only asked where it may be something."""
+    if not may_have_near_light(scene, field):
+        return None
+    context = light_context(scene)
+    return None if context is None else near_light(context, field)
 
 
 def scene_bounds(scene: Scene) -> np.ndarray:

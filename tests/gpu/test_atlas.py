@@ -13,7 +13,7 @@ from scene_builders import volume
 from rtgi_addon.effects.atlas.bake import bake_atlas
 from rtgi_addon.effects.atlas.relight import STALE_ATLAS
 from rtgi_addon.effects.atlas.settings import AtlasSettings
-from rtgi_addon.effects.lit import indirect_irradiance
+from rtgi_addon.effects.lit import indirect_irradiance, light_context
 from rtgi_addon.progress import Progress
 from rtgi_addon.techniques.lattice.field import ProbeField
 from rtgi_addon.techniques.transfer import TECHNIQUE
@@ -41,7 +41,7 @@ def shown(scene, field, seen=None):
 def test_both_halves_light_the_same(gpu_device, floor, height):
     scene, field = floor
     result, frame = shown(scene, field, view((0.0, -3.0, height)))
-    found, expected = frame.irradiance[frame.gbuffer.seen][:, :3], indirect_irradiance(scene, field, frame.gbuffer)
+    found, expected = frame.irradiance[frame.gbuffer.seen][:, :3], indirect_irradiance(frame.context, field, frame.gbuffer)
     assert not result.notes and np.abs(found - expected).max() < 1e-4 * expected.max()
     assert (np.ptp(expected) > 0.2) == (height > 0)
 
@@ -85,7 +85,7 @@ def test_texels_follow_the_light_of_transfer(gpu_device):
         result.take_light()
     result.frame(view((0.0, -3.0, 2.0)), SIZE)
     frame = drawn_frame(result, result.image("combined"), view((0.0, -3.0, 2.0)))
-    expected = indirect_irradiance(dimmed, with_atlas(field.relight(dimmed), field, dimmed), frame.gbuffer)
+    expected = indirect_irradiance(light_context(dimmed), with_atlas(field.relight(dimmed), field, dimmed), frame.gbuffer)
     on_floor = frame.gbuffer.instance[frame.gbuffer.seen] == 0
     found = frame.irradiance[frame.gbuffer.seen][:, :3]
     assert not result.notes and not result.error

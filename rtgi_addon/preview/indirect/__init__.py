@@ -18,11 +18,12 @@ FRAME_SAMPLES = 32
 _UNDIMMED = frozenset({"vpl"})
 
 
-def make_indirect(field: Field | None, scene: Scene, *, samples: int | None = None, live=None):
+def make_indirect(field: Field | None, scene: Scene, *, samples: int | None = None, live=None, near=None):
     """The indirect light (indirect_pass.Indirect) of ``field`` as baked from ``scene``: the technique's own function, or that of
     its probe grids where it has none. Without a field it is what ``live`` captures, the settings of a technique that needs no bake
     (see ``needs_no_bake``), or with None the world's, with nothing in its way.
 
+    ``near`` (a techniques.lattice.near_light.NearLight of ``field``) is what it leaves out of probes' light.
     ``samples`` replaces the number that a technique which samples reads at each receiver: frames that are averaged need few. GPU
     objects: main thread only.
     """
@@ -50,7 +51,7 @@ def make_indirect(field: Field | None, scene: Scene, *, samples: int | None = No
             return LiveVoxelsLight(live, None, scene, samples)
         return live_lpv_light(live) if isinstance(live, LpvSettings) else live_rsm_light(live, samples)
     makers = {
-        "probes": lambda: RelitLight(field, probe_tables),
+        "probes": lambda: RelitLight(field, probe_tables if near is None else lambda relit: probe_tables(near.left_of(relit))),
         "lpv": lambda: LpvLight(field),
         "vpl": lambda: RelitLight(field, partial(vpl_tables, samples=samples, seen=SeenPlanes()), holds_direct=False),
         "rsm": lambda: rsm_light(field, samples),

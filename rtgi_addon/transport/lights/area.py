@@ -10,7 +10,7 @@ from ...scene import AreaLight, PointLight
 from ..vectors import dot, normalized
 from .area_sampling import AreaRows, sample_shape, shape_density
 from .kind import Emission, LampKind
-from .shadow_view import ShadowView, depths, look_along, parallel, pinhole, texel_centres
+from .shadow_view import ShadowView, depths, look_along, parallel, pinhole, side_views, texel_centres
 from .tabulated import CELLS, cumulated, invert
 
 # A spread this close to π [rad] is none.
@@ -141,8 +141,7 @@ class Area(LampKind):
             position = centre + s * half_u + t * half_v
             faces = [pinhole(front, position, bounds, min(tangent, 1.0))]
             if tangent > 1:
-                faces += [pinhole(look_along(side, normal), position, bounds, bottom=0.0)
-                          for side in (front[:, 0], -front[:, 0], front[:, 1], -front[:, 1])]
+                faces += side_views(front, position, bounds)
             views += [face._replace(share=1.0 / area_points) for face in faces]
         return views
 

@@ -136,6 +136,12 @@ def pinhole(rotation: np.ndarray, position, bounds: np.ndarray, tangent: float =
     return Placed(pose(rotation, position), window, False, near, far)
 
 
+def side_views(front: np.ndarray, position, bounds: np.ndarray) -> list[Placed]:
+    """The four halves of a cube's faces beside the ``front`` one that a rotation (3, 3) looks along: what is before a plane."""
+    return [pinhole(look_along(side, -front[:, 2]), position, bounds, bottom=0.0)
+            for side in (front[:, 0], -front[:, 0], front[:, 1], -front[:, 1])]
+
+
 def depths(rotation: np.ndarray, position, bounds: np.ndarray) -> tuple[float, float]:
     """Near and far [m] between which all of ``bounds`` lies that is in front: close to it, since rays start at the near plane."""
     offset = corners(bounds) - np.asarray(position, np.float64)
