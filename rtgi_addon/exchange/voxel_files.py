@@ -13,6 +13,7 @@ write these files.
 """
 
 import json
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -38,10 +39,14 @@ CELL_TEXELS, LIGHT_TEXELS = CELL_NUMBERS // 4, COLOURS
 
 _COUNT = whole(1, 2**31)
 _LEVEL = record({"resolution": listing(_COUNT, 3), "first": whole(0, 2**31)})
-_INDEX = record({"schema": text, "sh_convention": exactly(SH_CONVENTION), "corner": listing(number(-1e30, 1e30), 3),
-                 "cell": number(1e-30, 1e30), "resolution": listing(_COUNT, 3), "levels": listing(_LEVEL), "cells_count": _COUNT,
-                 "rows_count": _COUNT, "rows": file_name, "cells": file_name, "light": file_name, "cones": whole(6, 256),
-                 "step": number(0.0), "near": number(0.0), "sky": listing(listing(number(), 3), 9), "left": listing(text)})
+_PLACE = {"corner": listing(number(-1e30, 1e30), 3), "cell": number(1e-30, 1e30), "resolution": listing(_COUNT, 3)}
+_INDEX = record({"schema": text, "sh_convention": exactly(SH_CONVENTION), **_PLACE, "levels": listing(_LEVEL),
+                 "cells_count": _COUNT, "rows_count": _COUNT, "rows": file_name, "cells": file_name, "light": file_name,
+                 "cones": whole(6, 256), "step": number(0.0), "near": number(0.0), "sky": listing(listing(number(), 3), 9),
+                 "left": listing(text)},
+                {"cascades": listing(record(_PLACE))})
+# How far cells of nested grids may be off twice those within, and off their lattice.
+_ROUNDING = 1e-4
 
 
 def fold(items: np.ndarray, texels: int) -> np.ndarray:
@@ -73,8 +78,8 @@ def write_voxels(bundle, voxels: ShippedVoxels) -> list[str]:
         raise BakeError("the voxels hold values that are not finite",
                         "look for infinite light strengths in the scene, and report this with the file")
     index = {
-        "schema": SCHEMA, "sh_convention": SH_CONVENTION, "corner": list(tables.grid.corner), "cell": tables.grid.cell,
-        "resolution": list(tables.grid.resolution),
+        "schema": SCHEMA, "sh_convention": SH_CONVENTION, **_place(tables.grid),
+        **({"cascades": [_place(grid) for grid in tables.grids]} if len(tables.grids) > 1 else {}),
         "levels": [{"resolution": shape[:3], "first": shape[3]} for shape in tables.shapes.tolist()],
         "cells_count": len(tables.rows), "rows_count": len(tables.cells), **{name: f"{FOLDER}/{name}.exr" for name in _LETTERS},
         "cones": voxels.cones, "step": voxels.step, "near": voxels.near, "sky": voxels.sky.tolist(), "left": list(voxels.left)}
@@ -120,8 +125,7 @@ def read_voxels(bundle, known) -> ShippedVoxels:
     shapes = np.array([[*level["resolution"], level["first"]] for level in index["levels"]], np.int64)
     if rows.min() < 0 or rows.max() >= len(cells) or np.count_nonzero(rows) != len(cells) - 1:
         raise BakeError(f"{bundle / index['rows']} names other rows than there are", RESTORE)
-    grid = VoxelGrid(tuple(map(float, index["corner"])), float(index["cell"]), tuple(index["resolution"]))
-    tables = VoxelTables(grid, shapes, rows, cells.reshape(len(cells), -1), light, wide)
+    tables = VoxelTables(_grids(index), shapes, rows, cells.reshape(len(cells), -1), light, wide)
     return ShippedVoxels(tables, index["cones"], index["step"], index["near"], np.array(index["sky"], np.float64),
                          tuple(index["left"]))
 
@@ -131,19 +135,39 @@ _LETTERS = {"rows": "Y", "cells": "RGBA", "light": "RGB"}
 
 def _header(index: dict, name: str) -> dict:
     """What an image repeats of the index, so that it can be read alone."""
-    return {key: index[key] for key in ("schema", "corner", "cell", "resolution", "levels", "cells_count", "rows_count")} | {
-        "list": name}
+    return {key: index[key] for key in ("schema", "corner", "cell", "resolution", "levels", "cascades", "cells_count", "rows_count")
+            if key in index} | {"list": name}
+
+
+def _place(grid: VoxelGrid) -> dict:
+    return {"corner": list(grid.corner), "cell": grid.cell, "resolution": list(grid.resolution)}
+
+
+def _grids(index: dict) -> tuple[VoxelGrid, ...]:
+    return tuple(VoxelGrid(tuple(map(float, place["corner"])), float(place["cell"]), tuple(place["resolution"]))
+                 for place in index.get("cascades", [index]))
 
 
 def _check_index(index: dict, where: str) -> None:
     _INDEX(index, where)
     if 6 < index["cones"] < 12:
         raise Refused(f"{index['cones']} cones are none that can be traced")
-    inner, first = index["resolution"], 0
-    for level in index["levels"]:
+    grids, first, inner = _grids(index), 0, ()
+    _check_cascades(index, grids)
+    for which, level in enumerate(index["levels"]):
+        inner = grids[which].resolution if which < len(grids) else [-(-count // 2) for count in inner]
         if level["resolution"] != [count + 2 for count in inner] or level["first"] != first:
             raise Refused("levels are not those of its resolution")
         first += int(np.prod(level["resolution"]))
-        inner = [-(-count // 2) for count in inner]
     if first != index["cells_count"]:
         raise Refused(f"its levels have {first} cells, and not {index['cells_count']}")
+
+
+def _check_cascades(index: dict, grids: tuple[VoxelGrid, ...]) -> None:
+    if not grids or _place(grids[0]) != {key: index[key] for key in _PLACE} or len(index["levels"]) < len(grids):
+        raise Refused("cascades are not those of its levels")
+    for inner, outer in pairwise(grids):
+        corner, high = ((np.asarray(end) - outer.corner) / inner.cell for end in (inner.corner, inner.high))
+        nested = np.all(corner > -_ROUNDING) and np.all(high < 2.0 * np.asarray(outer.resolution) + _ROUNDING)
+        if not nested or abs(outer.cell / inner.cell - 2.0) > _ROUNDING or np.abs(corner - np.round(corner)).max() > _ROUNDING:
+            raise Refused("cascades do not lie within each other, in cells twice as large")

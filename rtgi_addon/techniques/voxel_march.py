@@ -64,7 +64,7 @@ class MarchField(VoxelField):
         self.arriving = None
         if settings.gather == CELLS:
             self._standing = between(self.voxels, context.geometry)
-            self.arriving = sweep(self._standing, self.voxels.opacity, self.voxels.by_face(self.leaving), settings.rays, _ORDER,
+            self.arriving = sweep(self._standing, self.voxels.opacity, self.voxels.by_face(self.leaving[0]), settings.rays, _ORDER,
                                   self._sky, context.threads, progress.span(0.9, 1.0))
 
     def gather(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:

@@ -11,7 +11,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from real_godot import as_read, complaints, damaged, drawing, drawn, each_renderer, finds, godot, imported, real, same_numbers
+from real_godot import (
+    as_read,
+    complaints,
+    damaged,
+    drawing,
+    drawn,
+    each_renderer,
+    finds,
+    godot,
+    headless,
+    imported,
+    real,
+    same_numbers,
+)
 from voxel_bundles import lit_voxels, voxel_bundle
 
 from rtgi_addon.errors import BakeError
@@ -32,7 +45,8 @@ def whole(tmp_path_factory):
 
 
 def test_files(whole):
-    assert {"rtgi/voxels.json", "rtgi/voxels.gd", "rtgi/voxels.gdshaderinc", "rtgi/voxel_surface.gdshader", "rtgi/voxels/rows.exr",
+    assert {"rtgi/voxels.json", "rtgi/voxels.gd", "rtgi/voxel_cones.gd", "rtgi/voxels.gdshaderinc",
+            "rtgi/voxel_surface.gdshader", "rtgi/voxels/rows.exr",
             "rtgi/voxels/cells.exr", "rtgi/voxels/light.exr.import", "conformance/voxels.gd", "conformance/voxels.json",
             "conformance/kit/voxels.json"} <= set(whole.files)
     planes, _ = read_exr(whole.out / "rtgi/voxels/rows.exr")
@@ -90,14 +104,19 @@ def project(whole):
 
 
 @real
+def test_scripts_agree(project):
+    headless(project, SCRIPT, 4)
+
+
+@real
 @each_renderer
 def test_shaders_agree(project, options):
-    drawn(project, SCRIPT, options, 4)
+    drawn(project, SCRIPT, options, 8)
 
 
 @real
 def test_dim_rooms_agree(tmp_path):
-    drawn(imported(GODOT.export(dim_bundle(), tmp_path / "dim").out), SCRIPT, ("--rendering-driver", "vulkan"), 4)
+    drawn(imported(GODOT.export(dim_bundle(), tmp_path / "dim").out), SCRIPT, ("--rendering-driver", "vulkan"), 8)
 
 
 @real
@@ -110,5 +129,7 @@ def test_a_surface_is_lit(project):
 
 @real
 def test_damage_is_found(project):
+    with damaged([project / "rtgi/voxel_cones.gd"], "adds = level > grid", "adds = false"):
+        finds(project, SCRIPT, "kit, voxels, script")
     with damaged([project / "rtgi/voxels.gdshaderinc"], "RTGI_CONE_TIGHT * met.share", "0.5 * met.share"):
         finds(project, SCRIPT, "bundle, voxels, shader")

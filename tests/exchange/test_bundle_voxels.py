@@ -20,16 +20,23 @@ class Field(TinyField):
         return lit_voxels()
 
 
+class Nested(TinyField):
+    def lit_voxels(self):
+        return lit_voxels(2)
+
+
 def write(out, field=Field):
     return write_bundle(out, field((make_grid(),), False, {}), closed_box(), settings={"order": 1}, seed=3, stats=lambda: {})
 
 
-def test_what_is_written_is_read_back(tmp_path):
-    path = write(tmp_path / "out")
-    found, own = read_bundle(path).voxels, lit_voxels()
+@pytest.mark.parametrize(("field", "cascades"), [(Field, 1), (Nested, 2)])
+def test_what_is_written_is_read_back(field, cascades, tmp_path):
+    path = write(tmp_path / "out", field)
+    found, own = read_bundle(path).voxels, lit_voxels(cascades)
     for name in ("rows", "cells", "light", "shapes", "wide"):
         assert np.array_equal(getattr(found.tables, name), getattr(own.tables, name))
-    assert found.tables.grid == own.tables.grid and (found.cones, found.step, found.near) == (12, 0.5, 3.0)
+    assert found.tables.grids == own.tables.grids and len(own.tables.grids) == cascades
+    assert (found.cones, found.step, found.near) == (12, 0.5, 3.0)
     points, normals = np.float32([[0.3, 0.2, 0.1], [-1.2, 0.4, -0.5]]), np.float32([[0, 0, 1], [0.6, 0.8, 0]])
     assert np.array_equal(found.irradiance(points, normals), own.irradiance(points, normals))
     assert found.irradiance(points, normals).max() > 0.1
@@ -39,6 +46,20 @@ def test_what_is_written_is_read_back(tmp_path):
 def test_a_bundle_without_any_is_as_it_was(tmp_path):
     path = write(tmp_path / "out", TinyField)
     assert read_bundle(path).voxels is None and "voxels" not in json.loads((path / "bake.json").read_text())
+
+
+def test_nested_grids_that_cannot_be_are_told(tmp_path):
+    path = write(tmp_path / "out", Nested)
+    whole = (path / "voxels/voxels.json").read_text()
+    for number, key, value, said in ((1, "cell", 0.3, "in cells twice as large"),
+                                     (1, "corner", [9.0, 9.0, 9.0], "within each other"),
+                                     (0, "resolution", [9, 9, 9], "not those of its levels")):
+        index = json.loads(whole)
+        index["cascades"][number][key] = value
+        (path / "voxels/voxels.json").write_text(json.dumps(index))
+        reseal(path, "voxels/voxels.json")
+        with pytest.raises(BakeError, match=said):
+            read_bundle(path)
 
 
 @pytest.mark.parametrize(("damage", "said"), [

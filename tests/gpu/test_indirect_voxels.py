@@ -120,12 +120,60 @@ def test_cells_that_hand_on_light_are_shown_through_probes(indirect):
     assert "indirect_probes" in made.samplers
 
 
-def test_nested_grids_are_shown_through_probes(indirect):
-    scene = replace(ROOMS, volumes=(build.volume(resolution=(2, 2, 2), center=(-1.0, 0.0, -0.7), half_size=0.3),))
-    field = bake("cone_tracing", scene, cascades=2, resolution=60, reach=20.0, cones=6, order=1)
-    assert len(field.cascades) == 2
+def nested(name, count, world=None, **settings):
+    """A scene and its field in ``count`` grids about a corner of a room, off the lattices' middle; points in it as far as it goes,
+    most of them about the borders of grids."""
+    scene = replace(ROOMS, volumes=(build.volume(resolution=(2, 2, 2), center=(-0.9, 0.07, -0.9), half_size=0.3),))
+    scene = scene if world is None else replace(under(world), volumes=(build.volume(center=(0.4, 0.1, 0.3), half_size=0.2),))
+    few = {"cones": 6} if name == "cone_tracing" else {"rays": 16}
+    field = bake(name, scene, **{"cascades": count, "resolution": 60, "reach": 20.0, "order": 1, **few, **settings})
+    assert len(field.cascades) == count
+    rng, points = np.random.default_rng(5), [points_in((1.9, 0.9, 0.9), 200, 5)]
+    for part in field.cascades[:-1]:
+        inside = rng.uniform(part.grid.corner, part.grid.high, (200, 3))
+        axis, low = rng.integers(3, size=200), np.asarray(part.grid.corner) + 3.5 * part.grid.cell
+        inside[np.arange(200), axis] = low[axis] - rng.uniform(0.0, 3.0, 200) * part.grid.cell
+        points.append(inside.astype(np.float32))
+    return scene, field, np.concatenate(points)
+
+
+@pytest.mark.parametrize(("name", "count", "settings"), [
+    ("cone_tracing", 2, {}), ("cone_tracing", 3, {"cones": 12}), ("voxel_march", 3, {"opacity": "first hit"})])
+def test_nested_grids(indirect, name, count, settings):
+    scene, field, points = nested(name, count, **settings)
     made = indirect.make_indirect(field, scene)
-    assert "indirect_probes" in made.samplers and made.moved is None
+    assert "voxel_rows" in made.samplers
+    close(made, field, points, directions(len(points)), 2e-5)
+    close(made, field, *on_walls((1.98, 0.98, 0.98), 300), 2e-5)
+    # By the outermost alone it is another light.
+    outer = type(field)(field.context, field.settings, field.seed, field.cascades[-1:], Progress())
+    assert np.mean(relative_error(made, outer, points, directions(len(points))) > 1e-3) > 0.05
+
+
+@pytest.mark.parametrize("name", ["cone_tracing", "voxel_march"])
+def test_nested_grids_under_a_sky(indirect, name):
+    scene, field, points = nested(name, 2, gradient())
+    close(indirect.make_indirect(field, scene), field, points, directions(len(points)), 1e-4)
+
+
+def test_nested_grids_follow_what_moves_and_the_camera_about_which_they_lie(indirect):
+    scene, field, points = nested("cone_tracing", 2, center="volumes")
+    made = indirect.make_indirect(None, scene, live=field.settings)
+    assert waited(made)
+    close(made, field, points, directions(len(points)), 1e-4)
+    aside = replace(scene, volumes=(build.volume(resolution=(2, 2, 2), center=(-0.5, 0.07, -0.9), half_size=0.3),))
+    assert made.follow(aside) and waited(made) and made.error is None
+    known = {name: getattr(field.settings, name) for name in ("cascades", "resolution", "reach", "cones")}
+    again = bake("cone_tracing", aside, **known)
+    assert again.cascades[0].grid != field.cascades[0].grid
+    close(made, again, points, directions(len(points)), 1e-4)
+    # What is gone is taken out of all grids, until the worker is done.
+    without = replace(aside, instances=aside.instances[1:])
+    made.follow(without)
+    assert made.moved is not None
+    made.put_in(None)
+    assert waited(made)
+    made.close()
 
 
 def moved(scene, offset):

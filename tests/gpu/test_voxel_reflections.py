@@ -30,14 +30,18 @@ def scene(roughness):
                                                       for item, place in zip(made.instances, places, strict=True)))
 
 
-@pytest.mark.parametrize(("name", "settings"), [("cone_tracing", {"cones": 6}), ("voxel_march", {"gather": "voxels", "order": 1})])
+NESTED = {"cones": 6, "cascades": 2, "resolution": 44}
+
+
+@pytest.mark.parametrize(("name", "settings"), [("cone_tracing", {"cones": 6}), ("cone_tracing", NESTED),
+                                                ("voxel_march", {"gather": "voxels", "order": 1})])
 @pytest.mark.parametrize("orthographic", [False, True])
 @pytest.mark.parametrize("roughness", [0.15, 0.6])
 def test_both_halves_reflect_the_same(gpu_device, name, settings, orthographic, roughness):
     from rtgi_addon.preview.renderer import PreviewRenderer
     from rtgi_addon.preview.settings import PreviewSettings
     shown, seen, technique = scene(roughness), view((0.0, -3.2, 1.2), orthographic, 2.2), techniques.get(name)
-    wanted = technique.Settings(resolution=20, light="voxels", **settings)
+    wanted = technique.Settings(**{"resolution": 20, "light": "voxels", **settings})
     field = technique.bake(shown, wanted, np.random.default_rng(0), Progress())
     chosen, given = Chosen(EFFECT, EFFECT.Settings()), PreviewSettings(shadow_resolution=128)
     plain, result = (PreviewRenderer(shown, field, given, ("combined",), effects=effects) for effects in ((), (chosen,)))

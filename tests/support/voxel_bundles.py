@@ -15,11 +15,11 @@ from rtgi_addon.scene import World
 
 
 @cache
-def lit_voxels():
-    """Those of two rooms without a roof's worth of resolution, under a grey sky."""
+def lit_voxels(cascades=1):
+    """Those of two rooms without a roof's worth of resolution, under a grey sky; in so many nested grids."""
     scene = replace(rooms.two_rooms(resolution=(2, 2, 2), half_size=(2.0, 0.95, 0.95)), world=World.constant(0.3))
     technique = techniques.get("cone_tracing")
-    settings = technique.Settings(resolution=20, cones=12, light="voxels")
+    settings = technique.Settings(resolution=20 if cascades == 1 else 48, cones=12, light="voxels", cascades=cascades)
     return technique.bake(scene, settings, np.random.default_rng(1), Progress()).lit_voxels()
 
 

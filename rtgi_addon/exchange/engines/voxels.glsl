@@ -22,14 +22,24 @@ vec3 rtgi_voxel_sky(vec3 d)
   return max(sum, vec3(0.0));
 }
 
-// What one cone sees, sky and all: from a place in cells, 2·spread as wide as it is long. `surface`: it leaves one with that normal.
+// What one cone sees, sky and all: from a place in the finest cells, 2·spread as wide as it is long. `surface`: it leaves one with that
+// normal.
 vec3 rtgi_voxel_seen(vec3 start, vec3 direction, vec3 normal, bool surface, float spread)
 {
-  RTGIVoxelsSeen seen = rtgi_voxel_cone(RTGIVoxelRay(start, direction, normal, surface), spread, RTGI_VOXEL_STEP, RTGI_VOXEL_NEAR);
-  return seen.radiance + (seen.passed > 0.0 ? seen.passed * rtgi_voxel_sky(direction) : vec3(0.0));
+  vec3 sum = vec3(0.0);
+  float left = 1.0;
+  for (int grid = 0; grid < RTGI_VOXEL_GRIDS && left > 0.0; grid++) {
+    float share = rtgi_voxel_share(grid, start, left);
+    if (share > 0.0) {
+      RTGIVoxelRay ray = RTGIVoxelRay(grid, rtgi_voxel_place(0, grid, start), direction, normal, surface);
+      RTGIVoxelsSeen seen = rtgi_voxel_cone(ray, spread, RTGI_VOXEL_STEP, RTGI_VOXEL_NEAR);
+      sum += share * (seen.radiance + (seen.passed > 0.0 ? seen.passed * rtgi_voxel_sky(direction) : vec3(0.0)));
+    }
+  }
+  return sum;
 }
 
-// Irradiance [W/m^2] at a place in cells under a unit normal of the voxels' own axes.
+// Irradiance [W/m^2] at a place in the finest cells under a unit normal of the voxels' own axes.
 vec3 rtgi_voxel_irradiance(vec3 start, vec3 normal)
 {
   vec3 sum = vec3(0.0);

@@ -14,10 +14,10 @@ import numpy as np
 
 from ...errors import BakeError
 from ...techniques.voxels.shipped import HALF_MAX, ShippedVoxels, rounded
-from ...transport.voxels import VoxelGrid, Voxels, cones, rays
+from ...transport.voxels import VoxelGrid, Voxels
+from ...transport.voxels.cascades import nested_hierarchies
 from ...transport.voxels.cones import cone_set
-from ...transport.voxels.hierarchy import build_hierarchy
-from ...transport.voxels.tables import pack, row_numbers
+from ...transport.voxels.tables import NUMBERS, pack, row_numbers
 from ...transport.voxels.voxelize import NO_PLATE, Seen
 from ..voxel_files import lists_of
 from .axes import Axes
@@ -36,10 +36,6 @@ _MOST_ROWS = 1 << 22
 _FLOAT, _NUDGE = 1e-3, 2e-4
 # Points whose answer changes by more than this share of the brightest are at the edge of a cell, and are not asked.
 _EDGE = 2e-3
-_NUMBERS = {"VOXEL_SPENT": rays.SPENT, "VOXEL_GAP": rays.GAP, "VOXEL_PLATE": rays.PLATE, "VOXEL_NO_PLATE": NO_PLATE,
-            "VOXEL_TOUCHING": rays.TOUCHING, "VOXEL_OWN_AXIS": rays.OWN_AXIS, "VOXEL_OWN_PLANE": rays.OWN_PLANE,
-            "CONE_TIGHT": cones.TIGHT, "CONE_SUPPORT": cones.SUPPORT}
-
 
 @dataclass(frozen=True, eq=False)
 class EngineVoxels:
@@ -62,6 +58,26 @@ class EngineVoxels:
         matrix[:3, :3] = self.axes.blender_from_engine / (self.axes.scale * grid.cell)
         matrix[:3, 3] = -np.asarray(grid.corner) / grid.cell
         return matrix
+
+    @property
+    def cascades(self) -> list[dict]:
+        """Of each grid, finest first, its least and greatest corner in the engine's world, the side of its cells there, and its
+        resolution along Blender's axes."""
+        result = []
+        for grid in self.source.tables.grids:
+            ends = self.axes.vectors(np.array([grid.corner, grid.high]))
+            result.append({"low": ends.min(axis=0).tolist(), "high": ends.max(axis=0).tolist(), "cell": grid.cell * self.axes.scale,
+                           "resolution": list(grid.resolution)})
+        return result
+
+    @property
+    def lookup(self) -> dict:
+        """What scripts that trace cones need to know beside the lists."""
+        tables, (directions, weights, spread) = self.source.tables, cone_set(self.source.cones)
+        return {"numbers": {name: float(value) for name, value in NUMBERS.items()}, "grids": len(tables.grids),
+                "levels": tables.shapes.tolist(), "origins": tables.origins.tolist(),
+                "cones": np.column_stack([directions, weights]).tolist(), "spread": float(spread[0]),
+                "step": float(self.source.step), "near": float(self.source.near), "sky": self.source.sky.tolist()}
 
     def irradiance(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """(n, 3): what the engine is to find at its ``points`` (n, 3) under its unit ``normals`` (n, 3)."""
@@ -98,14 +114,14 @@ def voxels_glsl(voxels: EngineVoxels, array: str = "{kind}[{count}]({values})", 
     samplers rtgi_voxel_rows, rtgi_voxel_cells, rtgi_voxel_light; ``array`` is how its language says one. Lists are stored over
     ``cells`` and ``light``."""
     tables, (directions, weights, spread) = voxels.source.tables, cone_set(voxels.source.cones)
-    defines = {**{name: float(value) for name, value in _NUMBERS.items()}, "VOXEL_LEVELS": len(tables.shapes),
+    defines = {**{name: float(value) for name, value in NUMBERS.items()}, "VOXEL_LEVELS": len(tables.shapes),
+               "VOXEL_GRIDS": len(tables.grids),
                "VOXEL_CONES": len(weights), "VOXEL_SPREAD": float(spread[0]), "VOXEL_STEP": float(voxels.source.step),
                "VOXEL_NEAR": float(voxels.source.near),
                "VOXEL_CELLS_OVER": cells, "VOXEL_LIGHT_OVER": light}
     text = "".join(f"#define RTGI_{name} {value!r}\n" for name, value in defines.items())
-    resolution = ", ".join(map(str, tables.grid.resolution))
-    text += f"#define RTGI_VOXEL_RESOLUTION ivec3({resolution})\n"
-    for name, kind, rows in (("LEVEL", "ivec4", tables.shapes), ("CONE", "vec4", np.column_stack([directions, weights])),
+    cones = np.column_stack([directions, weights])
+    for name, kind, rows in (("LEVEL", "ivec4", tables.shapes), ("ORIGIN", "vec3", tables.origins), ("CONE", "vec4", cones),
                              ("SKY", "vec3", voxels.source.sky)):
         values = ", ".join(f"{kind}({', '.join(_number(value) for value in row)})" for row in rows.tolist())
         text += (f"const {kind} RTGI_VOXEL_{name}[{len(rows)}] = "
@@ -122,7 +138,7 @@ def _include(name: str) -> str:
     """One of the preview's includes under names that leave an engine's own alone."""
     text = (_SHADERS / name).read_text(encoding="utf-8")
     text = re.sub(r"^#include .*\n", "", text, flags=re.MULTILINE)
-    text = text.replace("indirect.level", "RTGI_VOXEL_LEVEL").replace("indirect.resolution", "RTGI_VOXEL_RESOLUTION")
+    text = text.replace("indirect.level", "RTGI_VOXEL_LEVEL").replace("indirect.origin", "RTGI_VOXEL_ORIGIN")
     for name in ("cells", "light"):
         text = text.replace(f"list_texel(voxel_{name},", f"VOXEL_{name.upper()}_OVER * list_texel(voxel_{name},")
     text = re.sub(r"\b(VOXEL|CONE)_(?=[A-Z])", r"RTGI_\1_", text)
@@ -144,8 +160,17 @@ def _slices(items: np.ndarray, texels: int) -> np.ndarray:
 
 @cache
 def kit_voxels(axes: Axes) -> EngineVoxels:
-    """Voxels of every kind at random: sheets that lie any way, solid ones that lie in no plane, and ones that let light through."""
-    rng, grid = np.random.default_rng(41), VoxelGrid((-3.0, -2.0, -2.5), 0.5, (12, 9, 10))
+    """Two nested grids of voxels of every kind at random: sheets that lie any way, solid ones that lie in no plane, and ones that
+    let light through."""
+    rng, shape = np.random.default_rng(41), (12, 9, 10)
+    nested = [_random_voxels(rng, VoxelGrid(corner, cell, shape)) for corner, cell in (((-1.25, -1.0, -1.5), 0.25),
+                                                                                       ((-3.0, -2.0, -2.5), 0.5))]
+    sky = np.concatenate([[[1.5, 1.8, 2.2]], 0.2 * rng.normal(size=(8, 3))])
+    return EngineVoxels(ShippedVoxels(rounded(pack(nested_hierarchies(nested))), 16, 0.5, 3.0, sky), axes)
+
+
+def _random_voxels(rng: np.random.Generator, grid: VoxelGrid) -> tuple[Voxels, np.ndarray]:
+    """Some of ``grid``, and what their faces show (m, 6, 3)."""
     cells = np.sort(rng.permutation(grid.count)[:grid.count // 6])
     count, kind = len(cells), rng.integers(3, size=len(cells))
     normal = unit(rng.normal(size=(count, 3)))
@@ -157,15 +182,11 @@ def kit_voxels(axes: Axes) -> EngineVoxels:
     area = np.where(kind == 0, 1.0, rng.uniform(0.3, 1.5, count)) * grid.cell**2
     middle = 0.3 * (rng.random((count, 3)) - 0.5)
     radiance = (rng.random((count, 6, 3)) * np.repeat(opacity, 2, axis=1)[:, :, None]).astype(np.float32)
-    sky = np.concatenate([[[1.5, 1.8, 2.2]], 0.2 * rng.normal(size=(8, 3))])
     # Some faces are fronts, so there are walls here and there.
     front, nothing = np.where(rng.random(6 * count) < 0.4, np.float32(1), np.float32(-1)), np.zeros(6 * count, np.float32)
     plates = np.where(rng.random((count, 3)) < 0.5, rng.uniform(-0.5, 0.5, (count, 3)), NO_PLATE).astype(np.float32)
     seen = Seen(np.arange(6 * count), nothing + 1, nothing.astype(np.int32), nothing, nothing, front)
-    voxels = Voxels(grid, cells, opacity, area, normal, np.zeros((count, 3)), lie, middle, kind != 2,
-                    plates, seen)
-    tables = rounded(pack(build_hierarchy(voxels, radiance)))
-    return EngineVoxels(ShippedVoxels(tables, 16, 0.5, 3.0, sky), axes)
+    return Voxels(grid, cells, opacity, area, normal, np.zeros((count, 3)), lie, middle, kind != 2, plates, seen), radiance
 
 
 def conformance_json(voxels: EngineVoxels) -> dict:
@@ -175,9 +196,11 @@ def conformance_json(voxels: EngineVoxels) -> dict:
 
 
 def _case(name: str, source: str, voxels: EngineVoxels) -> dict:
-    """POINTS points of the grid with normals, clear of places where rounding decides which cell a ray meets."""
-    rng, grid = np.random.default_rng(42), voxels.source.tables.grid
-    inside = rng.uniform(0.02, 0.98, (POINTS + POINTS // 2, 3)) * (grid.high - grid.corner) + grid.corner
+    """POINTS points of the grids with normals, clear of places where rounding decides which cell a ray meets."""
+    rng, grids = np.random.default_rng(42), voxels.source.tables.grids
+    grid, chosen = grids[0], np.arange(POINTS + POINTS // 2) % len(grids)
+    corners, highs = np.array([part.corner for part in grids])[chosen], np.array([part.high for part in grids])[chosen]
+    inside = rng.uniform(0.02, 0.98, corners.shape) * (highs - corners) + corners
     points = voxels.axes.vectors(inside).astype(np.float32).astype(np.float64)
     normals = unit(rng.normal(size=points.shape)).astype(np.float32).astype(np.float64)
     found, spread = voxels.irradiance(points, normals), np.zeros(points.shape)

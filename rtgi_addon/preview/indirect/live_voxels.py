@@ -29,9 +29,8 @@ _SEED = 0
 
 
 def tables_of_field(field: VoxelField, samples: int | None) -> Tables:
-    """The voxels of ``field``; where receivers read what arrives in them, harmonics of all, or nested grids, its probes."""
-    by_probes = getattr(field.settings, "gather", None) == CELLS or len(field.cascades) > 1
-    return grid_tables(field) if by_probes else voxel_tables(field, samples)
+    """The voxels of ``field``; where receivers read what arrives in them, harmonics of all, its probes."""
+    return grid_tables(field) if getattr(field.settings, "gather", None) == CELLS else voxel_tables(field, samples)
 
 
 class LiveVoxelsLight(RelitLight):
@@ -67,8 +66,8 @@ class LiveVoxelsLight(RelitLight):
         field = self.field
         if self._followed is None:
             self._followed = FollowedVoxels(field, self._moved)
-        hierarchy = self._followed.with_points(points)
-        self.set(tables_of(LitVoxels(field.context, field.settings, field.seed, hierarchy), self._samples))
+        shown = LitVoxels(field.context, field.settings, field.seed, self._followed.with_points(points))
+        self.set(tables_of(shown, self._samples))
 
     def follow(self, scene: Scene) -> bool:
         """See FieldLight."""
@@ -85,8 +84,8 @@ class LiveVoxelsLight(RelitLight):
 
     def _compare(self) -> None:
         self._moved = self._followed = None
-        # What arrives in cells, and in nested grids, is shown through probes, which know no surfaces.
-        if self.field is not None and getattr(self._settings, "gather", None) != CELLS and len(self.field.cascades) == 1:
+        # What arrives in cells is shown through probes, which know no surfaces.
+        if self.field is not None and getattr(self._settings, "gather", None) != CELLS:
             moved = moved_since(self.field.context.scene, self._drawn)
             self._moved = moved if moved.any else None
 

@@ -18,10 +18,9 @@ from ...techniques.voxels.field import LAMP_SAMPLES, RING, VoxelField
 from ...techniques.voxels.settings import VoxelSettings
 from ...transport.context import LightContext
 from ...transport.paths.sources import Sources
-from ...transport.voxels import cones, rays
+from ...transport.voxels import cones
 from ...transport.voxels.hierarchy import Hierarchy
-from ...transport.voxels.tables import VoxelTables, pack, row_numbers
-from ...transport.voxels.voxelize import NO_PLATE
+from ...transport.voxels.tables import NUMBERS, VoxelTables, pack, row_numbers
 from ..packing import fold, folded
 from ..uniforms import UniformStruct
 from .tables import Tables
@@ -40,50 +39,53 @@ _NO_CONES = (np.zeros((1, 3)), np.zeros(1), np.zeros(1))
 
 @dataclass(frozen=True, eq=False)
 class LitVoxels:
-    """What is looked up: the ``hierarchy`` of the scene of ``context``, by ``settings`` and the ``seed`` of rays."""
+    """What is looked up: the ``hierarchies`` of the scene of ``context``, of one grid or nested ones, by ``settings`` and the
+    ``seed`` of rays."""
 
     context: LightContext
     settings: VoxelSettings
     seed: int
-    hierarchy: Hierarchy
+    hierarchies: tuple[Hierarchy, ...]
 
 
 def voxel_tables(field: VoxelField, samples: int | None = None) -> Tables:
-    """The voxels of ``field``, read as it does; of nested grids the outermost alone. With ``samples`` a receiver follows no more
-    rays, or about FRAME_CONES cones, those of its own turn, for all."""
-    return tables_of(LitVoxels(field.context, field.settings, field.seed, field.hierarchies[-1]), samples)
+    """The voxels of ``field``, read as it does. With ``samples`` a receiver follows no more rays, or about FRAME_CONES cones, those
+    of its own turn, for all."""
+    return tables_of(LitVoxels(field.context, field.settings, field.seed, field.hierarchies), samples)
 
 
 def tables_of(lit: LitVoxels, samples: int | None = None) -> Tables:
     """As ``voxel_tables``. Raises BakeError for more voxels than a texture tells apart."""
-    hierarchy, settings = lit.hierarchy, lit.settings
+    settings, outermost = lit.settings, lit.hierarchies[-1].grid
     by_cones = isinstance(settings, ConeSettings)
     directions, weights, spread = cones.cone_set(settings.cones) if by_cones else _NO_CONES
     count = 0 if by_cones else settings.rays if samples is None else min(settings.rays, samples)
     stride = 1 if samples is None else -(-len(weights) // FRAME_CONES)
-    tables = pack(hierarchy)
+    tables = pack(lit.hierarchies)
     shapes = tables.shapes.tolist()
     hides, sky, bright = _beyond(lit)
     struct = UniformStruct("VoxelGather", (
-        ("vec4", "corner"), ("ivec3", "resolution"), ("float", "step"), ("float", "near"), ("float", "spread"),
+        ("vec4", "corner"), ("float", "step"), ("float", "near"), ("float", "spread"),
         ("float", "first_hit"), ("int", "rays"), ("int", "stride"), ("uint", "seed"), ("ivec2", "hidden"), ("ivec2", "sky"),
-        ("mat4", "map_from_world"), ("ivec4", "level", len(shapes)), ("vec4", "cone", len(weights))))
+        ("mat4", "map_from_world"), ("ivec4", "level", len(shapes)), ("vec4", "origin", len(shapes)),
+        ("vec4", "cone", len(weights))))
     turn = np.eye(4)
     turn[:3, :3] = lit.context.scene.world.map_from_world
     first_hit = not by_cones and settings.opacity == FIRST_HIT
     values = {
-        "corner": (*hierarchy.grid.corner, hierarchy.grid.cell), "resolution": hierarchy.grid.resolution,
-        "step": settings.step if by_cones else 1.0, "near": settings.near if by_cones else 0.0, "spread": spread[0],
+        "corner": (*tables.grid.corner, tables.grid.cell), "step": settings.step if by_cones else 1.0,
+        "near": settings.near if by_cones else 0.0, "spread": spread[0],
         "first_hit": OCCUPIED if first_hit else _NEVER, "rays": count, "stride": stride, "seed": lit.seed & 0xFFFFFFFF,
-        "hidden": (PATCHES, DIRECTIONS) if goes_on(lit.context, hierarchy.grid) else (0, 0), "map_from_world": turn,
-        "sky": (_sky_kind(lit.context), len(bright)), "level": shapes,
+        "hidden": (PATCHES, DIRECTIONS) if goes_on(lit.context, outermost) else (0, 0), "map_from_world": turn,
+        "sky": (_sky_kind(lit.context), len(bright)), "level": shapes, "origin": np.pad(tables.origins, ((0, 0), (0, 1))),
         "cone": np.concatenate([directions, weights[:, None]], axis=1)}
     textures = {"voxel_rows": _row_texels(tables), "voxel_cells": fold(tables.cells),
                 "voxel_light": _light_texels(tables), "voxel_sky": sky, "voxel_hidden": hides, "voxel_bright": fold(bright)}
     if not by_cones:
         textures["voxel_numbers"] = fold(sobol_owen(max(count, 1), 2, lit.seed))
     return Tables("indirect_cone_tracing" if by_cones else "indirect_voxel_march", struct, values, textures,
-                  (*_CONSTANTS, ("VOXEL_LEVELS", str(len(shapes))), ("VOXEL_CONES", str(len(weights)))))
+                  (*_CONSTANTS, ("VOXEL_LEVELS", str(len(shapes))), ("VOXEL_GRIDS", str(len(tables.grids))),
+                   ("VOXEL_CONES", str(len(weights)))))
 
 
 def _row_texels(tables: VoxelTables) -> np.ndarray:
@@ -106,7 +108,7 @@ def _sky_kind(context: LightContext) -> int:
 
 def _beyond(lit: LitVoxels) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Texels of what hides the sky beyond the grid and of the smooth sky; rows (b, 8) of samples of its bright patches."""
-    context, grid = lit.context, lit.hierarchy.grid
+    context, grid = lit.context, lit.hierarchies[-1].grid
     environment, nothing = context.environment, np.zeros((1, 1, 4), np.float32)
     dark = environment.is_black and not environment.bright.count
     hides = fold(hidden_sky(context, grid).reshape(-1, 1)) if goes_on(context, grid) and not dark else nothing
@@ -121,8 +123,5 @@ def _beyond(lit: LitVoxels) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return hides, sky, bright
 
 
-_LENGTHS = {"VOXEL_SPENT": rays.SPENT, "VOXEL_GAP": rays.GAP, "VOXEL_PLATE": rays.PLATE, "VOXEL_NO_PLATE": NO_PLATE,
-            "VOXEL_TOUCHING": rays.TOUCHING, "VOXEL_OWN_AXIS": rays.OWN_AXIS, "VOXEL_OWN_PLANE": rays.OWN_PLANE,
-            "CONE_TIGHT": cones.TIGHT, "CONE_SUPPORT": cones.SUPPORT}
-_CONSTANTS = (*((name, repr(float(value))) for name, value in _LENGTHS.items()), ("SKY_RING", str(RING)),
+_CONSTANTS = (*((name, repr(float(value))) for name, value in NUMBERS.items()), ("SKY_RING", str(RING)),
               ("MARCH_STREAM", f"{STREAM}u"))

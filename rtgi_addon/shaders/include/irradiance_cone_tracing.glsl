@@ -3,9 +3,9 @@
 #include "include/voxel_cones.glsl"
 #include "include/voxel_sky.glsl"
 
-vec3 indirect_irradiance(vec3 position_world, vec3 normal_world)
+// Of receivers in a grid, at a place in its cells.
+vec3 cones_irradiance(int grid, vec3 start, vec3 position_world, vec3 normal_world)
 {
-  vec3 start = (position_world - indirect.corner.xyz) / indirect.corner.w;
   vec3 sum = vec3(0.0);
   int turn = 0;
   if (indirect.stride > 1) {
@@ -17,10 +17,24 @@ vec3 indirect_irradiance(vec3 position_world, vec3 normal_world)
   }
   for (int index = turn; index < VOXEL_CONES; index += indirect.stride) {
     vec4 cone = indirect.cone[index];
-    VoxelRay ray = VoxelRay(start, voxel_about(normal_world, cone.xyz), normal_world, true);
+    VoxelRay ray = VoxelRay(grid, start, voxel_about(normal_world, cone.xyz), normal_world, true);
     VoxelsSeen seen = voxel_cone(ray, indirect.spread, indirect.step, indirect.near);
     vec3 beyond = seen.passed > 0.0 ? seen.passed * voxel_beyond(ray, indirect.spread) : vec3(0.0);
     sum += 3.14159265 * float(indirect.stride) * cone.w * (seen.radiance + beyond);
   }
-  return sum + voxel_bright_sky(start, normal_world);
+  return sum + voxel_bright_sky(grid, start, normal_world);
+}
+
+vec3 indirect_irradiance(vec3 position_world, vec3 normal_world)
+{
+  vec3 start = (position_world - indirect.corner.xyz) / indirect.corner.w;
+  vec3 sum = vec3(0.0);
+  float left = 1.0;
+  for (int grid = 0; grid < VOXEL_GRIDS && left > 0.0; grid++) {
+    float share = voxel_share(grid, start, left);
+    if (share > 0.0) {
+      sum += share * cones_irradiance(grid, voxel_place(0, grid, start), position_world, normal_world);
+    }
+  }
+  return sum;
 }

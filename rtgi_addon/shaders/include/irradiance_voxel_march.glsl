@@ -3,9 +3,9 @@
 #include "include/voxels.glsl"
 #include "include/voxel_sky.glsl"
 
-vec3 indirect_irradiance(vec3 position_world, vec3 normal_world)
+// Of receivers in a grid, at a place in its cells.
+vec3 march_irradiance(int grid, vec3 start, vec3 position_world, vec3 normal_world)
 {
-  vec3 start = (position_world - indirect.corner.xyz) / indirect.corner.w;
   // The same rays for the same place, whoever else is asked about.
   uint state = HASH_START;
   for (int axis = 0; axis < 3; axis++) {
@@ -30,9 +30,23 @@ vec3 indirect_irradiance(vec3 position_world, vec3 normal_world)
     float angle = wide ? 0.78539816 * ratio : 1.57079633 - 0.78539816 * ratio;
     vec2 disk = radius * vec2(cos(angle), sin(angle));
     vec3 local = vec3(disk, sqrt(max(0.0, 1.0 - dot(disk, disk))));
-    VoxelRay ray = VoxelRay(start, voxel_about(normal_world, local), normal_world, true);
-    VoxelsSeen seen = voxel_march(ray, VOXEL_FAR, indirect.first_hit);
+    VoxelRay ray = VoxelRay(grid, start, voxel_about(normal_world, local), normal_world, true);
+    VoxelsSeen seen = voxel_march_on(ray, indirect.first_hit);
     sum += seen.radiance + (seen.passed > 0.0 ? seen.passed * voxel_beyond(ray, 0.0) : vec3(0.0));
   }
-  return 3.14159265 * sum / float(indirect.rays) + voxel_bright_sky(start, normal_world);
+  return 3.14159265 * sum / float(indirect.rays) + voxel_bright_sky(grid, start, normal_world);
+}
+
+vec3 indirect_irradiance(vec3 position_world, vec3 normal_world)
+{
+  vec3 start = (position_world - indirect.corner.xyz) / indirect.corner.w;
+  vec3 sum = vec3(0.0);
+  float left = 1.0;
+  for (int grid = 0; grid < VOXEL_GRIDS && left > 0.0; grid++) {
+    float share = voxel_share(grid, start, left);
+    if (share > 0.0) {
+      sum += share * march_irradiance(grid, voxel_place(0, grid, start), position_world, normal_world);
+    }
+  }
+  return sum;
 }

@@ -11,9 +11,9 @@ struct ConeSample {
 };
 
 // Where a sample lies among a level's cells: its array begins with an empty layer, and samples lie at cells' centres.
-vec3 cone_place(int level, vec3 position)
+vec3 cone_place(int grid, int level, vec3 position)
 {
-  return clamp(position / float(1 << level) + 0.5, vec3(0.0), vec3(indirect.level[level].xyz - 1));
+  return clamp(voxel_place(grid, level, position) + 0.5, vec3(0.0), vec3(indirect.level[level].xyz - 1));
 }
 
 // The lowest of the eight cells that a sample lies between.
@@ -26,21 +26,32 @@ ivec3 cone_low(int level, vec3 place)
 // too wide for the walls in them.
 float cone_narrow(VoxelRay ray, float at, float step, float lod)
 {
-  for (int level = min(int(ceil(lod)), VOXEL_LEVELS - 1); level > 0; level--) {
-    if (lod > float(level - 1)) {
+  for (int over = min(int(ceil(lod)), VOXEL_LEVELS - 1 - ray.grid); over > 0; over--) {
+    if (lod > float(over - 1)) {
       vec3 middle = ray.start + ray.direction * (at + 0.5 * step * exp2(lod));
-      float number = voxel_number(level, cone_low(level, cone_place(level, middle)));
-      lod = fract(2.0 * number) > 0.25 ? float(level - 1) : lod;
+      int level = ray.grid + over;
+      float number = voxel_number(level, cone_low(level, cone_place(ray.grid, level, middle)));
+      lod = fract(2.0 * number) > 0.25 ? float(over - 1) : lod;
     }
   }
   return lod;
 }
 
-// Add a level's trilinear sample.
-void cone_add(int level, vec3 position, vec3 direction, float weight, inout ConeSample met)
+// The least that may answer at a place: where it is beyond a grid, the next one, and between two where both do.
+float cone_least(int grid, vec3 position)
 {
-  float size = float(1 << level);
-  vec3 place = cone_place(level, position);
+  float least = 0.0;
+  for (int over = 0; grid + over < VOXEL_GRIDS - 1 && least == float(over); over++) {
+    least += voxel_outside(grid + over, voxel_place(grid, grid + over, position));
+  }
+  return least;
+}
+
+// Add a level's trilinear sample.
+void cone_add(int grid, int level, vec3 position, vec3 direction, float weight, inout ConeSample met)
+{
+  float size = float(1 << (level - grid));
+  vec3 place = cone_place(grid, level, position);
   ivec3 low = cone_low(level, place);
   vec3 part = place - vec3(low);
   if (voxel_number(level, low) == 0.0) {
@@ -57,6 +68,15 @@ void cone_add(int level, vec3 position, vec3 direction, float weight, inout Cone
     Voxel voxel = voxel_at(row);
     vec3 way = direction * share;
     vec3 crossed = abs(way);
+#if VOXEL_GRIDS > 1
+    if (voxel.adds && level < VOXEL_GRIDS) {
+      // A grid's own cells add for those who are in a finer one, and add what they block.
+      voxel.adds = level > grid;
+      for (int axis = 0; axis < 3 && voxel.adds; axis++) {
+        crossed[axis] *= voxel.depth[axis] > 0.0 ? voxel_taken(voxel.depth[axis]) / voxel.depth[axis] : 1.0;
+      }
+    }
+#endif
     float depth = dot(voxel.depth, crossed);
     vec3 glow = depth > 0.0 ? voxel_glow(row, direction, crossed) : vec3(0.0);
     if (voxel.adds) {
@@ -85,12 +105,12 @@ VoxelsSeen voxel_cone(VoxelRay ray, float spread, float step, float near)
     clear = dot(ray.direction, ray.normal) / (CONE_SUPPORT * (own.x + own.y + own.z));
     reach = max(near, 1.0 / max(clear, 1e-6));
   }
-  VoxelsSeen seen = voxel_march(ray, reach, 1.0);
-  vec2 span = voxel_span(ray);
+  VoxelsSeen seen = voxel_march(ray, reach, 1.0, 0.0);
+  vec2 span = voxel_span(voxel_in(ray, VOXEL_GRIDS - 1)) * float(1 << (VOXEL_GRIDS - 1 - ray.grid));
   float at = max(span.x, seen.at);
   // What a wide cone reads of the outermost cells it reads in part when it has left them.
   float leave = span.y + min(max(spread * span.y, 1.0), clear * max(span.y, 0.0) + 1.0);
-  float top = float(VOXEL_LEVELS - 1);
+  float top = float(VOXEL_LEVELS - 1 - ray.grid);
   float sheet = 1.0;
   float level = 0.0;
   // Steps are no shorter than their share of a cell.
@@ -102,15 +122,19 @@ VoxelsSeen voxel_cone(VoxelRay ray, float spread, float step, float near)
     lod = min(min(lod, floor(log2(max(clear * at, 1.0)))), top);
     // A sheet lies in other places on other levels, so it is crossed on one.
     level = cone_narrow(ray, at, step, sheet < 1.0 ? level : lod);
+#if VOXEL_GRIDS > 1
+    level = max(level, cone_least(ray.grid, ray.start + ray.direction * at));
+#endif
     lod = level;
     float way = min(step * exp2(lod), leave - at);
     vec3 middle = ray.start + ray.direction * (at + 0.5 * way);
-    int lower = min(int(lod), VOXEL_LEVELS - 1);
+    int lower = min(int(lod), VOXEL_LEVELS - 1 - ray.grid);
     float blend = lod - float(lower);
     ConeSample met = ConeSample(0.0, vec3(0.0), 0.0, vec3(0.0));
-    cone_add(lower, middle, ray.direction, 1.0 - blend, met);
+    lower += ray.grid;
+    cone_add(ray.grid, lower, middle, ray.direction, 1.0 - blend, met);
     if (blend > 0.0 && lower + 1 < VOXEL_LEVELS) {
-      cone_add(lower + 1, middle, ray.direction, blend, met);
+      cone_add(ray.grid, lower + 1, middle, ray.direction, blend, met);
     }
     // Shares of one sheet add up, all else multiplies.
     float crossed = CONE_TIGHT * met.share * way;

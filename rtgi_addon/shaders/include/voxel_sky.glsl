@@ -20,7 +20,8 @@ float voxel_open(VoxelRay ray)
   if (indirect.hidden.x == 0) {
     return 1.0;
   }
-  vec3 size = vec3(indirect.resolution);
+  ray = voxel_in(ray, VOXEL_GRIDS - 1);
+  vec3 size = vec3(indirect.level[ray.grid].xyz - 2);
   float leave = clamp(voxel_span(ray).y, 0.0, VOXEL_FAR);
   vec3 place = clamp((ray.start + ray.direction * (leave < VOXEL_FAR ? leave : 0.0)) / size, vec3(0.0), vec3(1.0));
   // The side that is nearest, its patch, and the direction as octahedral coordinates.
@@ -62,15 +63,15 @@ vec3 voxel_beyond(VoxelRay ray, float spread)
   return radiance * voxel_open(ray);
 }
 
-// Irradiance of the sky's bright patches: (direction, 0), (irradiance of one that faces it, 0) of each sample.
-vec3 voxel_bright_sky(vec3 start, vec3 normal)
+// Irradiance of the sky's bright patches, for those in a grid: (direction, 0), (irradiance of one that faces it, 0) of each sample.
+vec3 voxel_bright_sky(int grid, vec3 start, vec3 normal)
 {
   vec3 sum = vec3(0.0);
   for (int index = 0; index < indirect.sky.y; index++) {
-    VoxelRay ray = VoxelRay(start, list_texel(voxel_bright, index, 2, 0).xyz, normal, true);
+    VoxelRay ray = VoxelRay(grid, start, list_texel(voxel_bright, index, 2, 0).xyz, normal, true);
     float cosine = dot(ray.direction, normal);
     if (cosine > 0.0) {
-      float passed = voxel_march(ray, VOXEL_FAR, 1.0).passed;
+      float passed = voxel_march_on(ray, 1.0).passed;
       sum += cosine * passed * (passed > 0.0 ? voxel_open(ray) : 0.0) * list_texel(voxel_bright, index, 2, 1).rgb;
     }
   }

@@ -1,5 +1,7 @@
 // Lit voxels and what is met on the way through them (transport/voxels/rays.py, march). Needs the samplers voxel_rows, voxel_cells and
-// voxel_light and the uniforms `indirect` of preview/indirect/voxels.py, which say what is in them; lengths are in finest cells.
+// voxel_light and the uniforms `indirect` of preview/indirect/voxels.py, which say what is in them. The first VOXEL_GRIDS of VOXEL_LEVELS
+// levels are nested grids (transport/voxels/cascades.py), those after them filtered from the last; who is in one of the grids begins at
+// its own level, and lengths are in its cells.
 #include "include/list.glsl"
 
 #define VOXEL_CELL_TEXELS 3
@@ -14,8 +16,9 @@ struct VoxelsSeen {
   float at;
 };
 
-// A ray or a cone's axis. `surface` says that it leaves one with this normal.
+// A ray or a cone's axis in the cells of a grid. `surface` says that it leaves one with this normal.
 struct VoxelRay {
+  int grid;
   vec3 start;
   vec3 direction;
   vec3 normal;
@@ -66,6 +69,42 @@ vec3 voxel_glow(int row, vec3 direction, vec3 crossed)
   return glow;
 }
 
+// Where a place in the cells of a grid lies in those of a level that is no finer.
+vec3 voxel_place(int grid, int level, vec3 place)
+{
+  place /= float(1 << (level - grid));
+#if VOXEL_GRIDS > 1
+  place -= (indirect.origin[level].xyz - indirect.origin[grid].xyz) / float(1 << level);
+#endif
+  return place;
+}
+
+// The ray in the cells of a grid that is no finer.
+VoxelRay voxel_in(VoxelRay ray, int grid)
+{
+  ray.start = voxel_place(ray.grid, grid, ray.start);
+  ray.grid = grid;
+  return ray;
+}
+
+// How far a place in the cells of a grid is on the way out of it: 0 within, 1 where the next one answers alone.
+float voxel_outside(int grid, vec3 place)
+{
+  vec3 inward = min(place, vec3(indirect.level[grid].xyz - 2) - place);
+  return clamp((VOXEL_EDGE + VOXEL_BLEND - min(min(inward.x, inward.y), inward.z)) / VOXEL_BLEND, 0.0, 1.0);
+}
+
+// The share that each grid has of what a receiver at a place in the finest cells gets, and what is left for the next ones.
+float voxel_share(int grid, vec3 place, inout float left)
+{
+  if (grid == VOXEL_GRIDS - 1) {
+    return left;
+  }
+  float share = left * (1.0 - voxel_outside(grid, voxel_place(0, grid, place)));
+  left -= share;
+  return share;
+}
+
 // Radiance of a sheet's side.
 vec3 voxel_shown(int row, float through)
 {
@@ -81,7 +120,7 @@ float voxel_taken(float depth)
 // Where the ray enters and leaves the grid; it begins at 0.
 vec2 voxel_span(VoxelRay ray)
 {
-  vec3 high = vec3(indirect.resolution);
+  vec3 high = vec3(indirect.level[ray.grid].xyz - 2);
   vec2 span = vec2(0.0, VOXEL_FAR);
   for (int axis = 0; axis < 3; axis++) {
     float start = ray.start[axis];
@@ -137,17 +176,18 @@ vec4 voxel_met(VoxelRay ray, int row, vec3 place, float at, float end)
   return vec4(shown, blocked + cut);
 }
 
-// Cell by cell until the ray leaves the grid, or comes to an empty cell after `reach`. `first_hit`: a cell that takes more ends it, and
-// shows itself whole; 1 and more let all count for what they cover.
-VoxelsSeen voxel_march(VoxelRay ray, float reach, float first_hit)
+// Cell by cell from `begin` until the ray leaves the grid, or comes to an empty cell after `reach`. `first_hit`: a cell that takes more
+// ends it, and shows itself whole; 1 and more let all count for what they cover.
+VoxelsSeen voxel_march(VoxelRay ray, float reach, float first_hit, float begin)
 {
   vec2 span = voxel_span(ray);
+  span.x = max(span.x, begin);
   VoxelsSeen seen = VoxelsSeen(vec3(0.0), 1.0, span.x);
   if (span.y <= span.x) {
     return seen;
   }
   vec3 entry = ray.start + ray.direction * span.x;
-  ivec3 last = indirect.resolution - 1;
+  ivec3 last = indirect.level[ray.grid].xyz - 3;
   ivec3 cell = clamp(ivec3(floor(entry)), ivec3(0), last);
   ivec3 step = ivec3(ray.direction.x < 0.0 ? -1 : 1, ray.direction.y < 0.0 ? -1 : 1, ray.direction.z < 0.0 ? -1 : 1);
   for (int axis = 0; axis < 3; axis++) {
@@ -164,7 +204,7 @@ VoxelsSeen voxel_march(VoxelRay ray, float reach, float first_hit)
     }
     int axis = ahead.x <= ahead.y && ahead.x <= ahead.z ? 0 : (ahead.y <= ahead.z ? 1 : 2);
     float end = min(ahead[axis], span.y);
-    int row = voxel_row(0, cell + 1);
+    int row = voxel_row(ray.grid, cell + 1);
     if (row > 0) {
       vec4 met = voxel_met(ray, row, ray.start - (vec3(cell) + 0.5), seen.at, end);
       if (first_hit < 1.0) {
@@ -175,10 +215,22 @@ VoxelsSeen voxel_march(VoxelRay ray, float reach, float first_hit)
     }
     seen.at = end;
     cell[axis] += step[axis];
-    if (end >= span.y || seen.passed <= VOXEL_SPENT || (end >= reach && voxel_row(0, cell + 1) == 0)) {
+    if (end >= span.y || seen.passed <= VOXEL_SPENT || (end >= reach && voxel_row(ray.grid, cell + 1) == 0)) {
       break;
     }
   }
   seen.passed = seen.passed <= VOXEL_SPENT ? 0.0 : seen.passed;
+  return seen;
+}
+
+// Through one grid after the other that the ray comes into, until it leaves the last.
+VoxelsSeen voxel_march_on(VoxelRay ray, float first_hit)
+{
+  VoxelsSeen seen = voxel_march(ray, VOXEL_FAR, first_hit, 0.0);
+  for (int grid = ray.grid + 1; grid < VOXEL_GRIDS && seen.passed > 0.0; grid++) {
+    ray = voxel_in(ray, grid);
+    VoxelsSeen on = voxel_march(ray, VOXEL_FAR, first_hit, 0.5 * seen.at);
+    seen = VoxelsSeen(seen.radiance + seen.passed * on.radiance, seen.passed * on.passed, on.at);
+  }
   return seen;
 }

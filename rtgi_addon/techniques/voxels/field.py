@@ -16,8 +16,8 @@ from ...transport.context import LightContext
 from ...transport.parallel import chunks, parallel_for
 from ...transport.paths.sources import Sources
 from ...transport.voxels import Voxels, holds_geometry, voxelize
-from ...transport.voxels.cascades import by_cascade, clipmap
-from ...transport.voxels.hierarchy import Hierarchy, build_hierarchy
+from ...transport.voxels.cascades import by_cascade, nested_hierarchies
+from ...transport.voxels.hierarchy import Hierarchy
 from ...transport.voxels.rays import box_span
 from ..base import Field, ProbeGrid, all_captured
 from ..kernels import Kernels
@@ -56,10 +56,9 @@ class VoxelField(Field):
         self._bright = [context.lamps.count] if context.environment.bright.count else []
         self._lamp_light = LampLight(context, False, LAMP_SAMPLES, seed)
         self.direct_lamps = self._lamp_light.names
-        # By point of ``voxels.seen``, so that voxels can be lit anew without some of what is in them.
-        leaving = light_voxels(context, cascades, settings, seed, self._sky, progress)
-        self.leaving = leaving[0]
-        self.hierarchies = hierarchies_of(cascades, leaving)
+        # Of each grid by point of its ``seen``, so that voxels can be lit anew without some of what is in them.
+        self.leaving = light_voxels(context, cascades, settings, seed, self._sky, progress)
+        self.hierarchies = hierarchies_of(cascades, self.leaving)
         self.hierarchy: Hierarchy = self.hierarchies[0]
         self.stats = {"rays": 0, "voxels": sum(len(part.cells) for part in cascades), "voxel_size": voxels.grid.cell,
                       "grid": list(voxels.grid.resolution)}
@@ -170,7 +169,7 @@ class VoxelField(Field):
 
     def lit_voxels(self) -> ShippedVoxels | None:
         """See Field."""
-        return None if len(self.cascades) > 1 else shipped(self)
+        return shipped(self)
 
     def relight(self, scene: Scene, progress: Progress | None = None) -> "VoxelField":
         """The field under the lamps and world of ``scene``: the voxels stay. Raises BakeError if geometry or materials differ."""
@@ -195,9 +194,6 @@ class VoxelField(Field):
 
     def _omissions(self) -> Iterator[Omission]:
         scene = self.context.scene
-        if len(self.cascades) > 1:
-            yield Omission(f"{self.technique} has voxels in {len(self.cascades)} cascades, and bundles and exports hold one grid: "
-                           f"their light goes along in probes alone")
         yield from beyond_grid(self.technique, self.context, self.cascades[-1].grid)
         limited = tuple(light.name for light in scene.lights if light.max_bounces is not None)
         if limited and self.settings.light != SURFACES:
@@ -210,8 +206,4 @@ class VoxelField(Field):
 
 def hierarchies_of(cascades: tuple[Voxels, ...], leaving: list[np.ndarray]) -> tuple[Hierarchy, ...]:
     """What receivers in each of nested grids read where ``leaving`` (e, 3) leaves what their voxels show."""
-    shown = [voxels.by_face(light) for voxels, light in zip(cascades, leaving, strict=True)]
-    finest = [build_hierarchy(voxels, light, None if index == len(cascades) - 1 else 1)
-              for index, (voxels, light) in enumerate(zip(cascades, shown, strict=True))]
-    afar = [build_hierarchy(voxels, light, 1, afar=True) for voxels, light in zip(cascades[1:], shown[1:], strict=True)]
-    return clipmap(tuple(finest), tuple(afar))
+    return nested_hierarchies([(voxels, voxels.by_face(light)) for voxels, light in zip(cascades, leaving, strict=True)])

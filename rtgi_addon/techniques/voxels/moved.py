@@ -8,7 +8,8 @@ import numpy as np
 from ...scene import Scene
 from ...scene.scene import STATIC, Instance
 from ...transport.context import same_values
-from ...transport.voxels.hierarchy import Hierarchy, build_hierarchy
+from ...transport.voxels.cascades import nested_hierarchies
+from ...transport.voxels.hierarchy import Hierarchy
 from ...transport.voxels.moving import CameraPoints, with_points, without
 
 
@@ -79,11 +80,10 @@ class FollowedVoxels:
     def __init__(self, field, moved: Moved):
         geometry = field.context.geometry
         self._unknown = moved.unknown
-        self._voxels, self._radiance = without(field.voxels, field.leaving, moved.gone[geometry.instance], geometry)
+        self._left = [without(voxels, leaving, moved.gone[geometry.instance], geometry)
+                      for voxels, leaving in zip(field.cascades, field.leaving, strict=True)]
 
-    def with_points(self, points: CameraPoints | None) -> Hierarchy:
-        """Their hierarchy with those of ``points`` (None: none are seen) that are of what has moved."""
-        voxels, radiance = self._voxels, self._radiance
-        if points is not None:
-            voxels, radiance = with_points(voxels, radiance, points.of(self._unknown))
-        return build_hierarchy(voxels, radiance)
+    def with_points(self, points: CameraPoints | None) -> tuple[Hierarchy, ...]:
+        """What receivers in each of their grids read with those of ``points`` (None: none are seen) that are of what has moved."""
+        put = None if points is None else points.of(self._unknown)
+        return nested_hierarchies([left if put is None else with_points(*left, put) for left in self._left])

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...numerics import sh
 from ...transport.parallel import chunks
+from ...transport.voxels.cascades import by_cascade
 from ...transport.voxels.cones import NEAR, STEP, cone_set, irradiance
 from ...transport.voxels.hierarchy import Hierarchy
 from ...transport.voxels.tables import VoxelTables, pack, unpack
@@ -35,8 +36,8 @@ class ShippedVoxels:
     left: tuple[str, ...] = ()
 
     @cached_property
-    def hierarchy(self) -> Hierarchy:
-        """What the tables stand for."""
+    def hierarchies(self) -> tuple[Hierarchy, ...]:
+        """What receivers in each of the grids read."""
         return unpack(self.tables)
 
     def beyond(self, _points, directions: np.ndarray, _spread) -> np.ndarray:
@@ -47,8 +48,13 @@ class ShippedVoxels:
     def irradiance(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """(n, 3) [W·m⁻²] at ``points`` (n, 3) under unit ``normals`` (n, 3): what an engine's shader finds."""
         spans = chunks(len(points), _TOGETHER)
-        return np.concatenate([irradiance(self.hierarchy, points[rows], normals[rows], cone_set(self.cones), self.beyond, self.step,
-                                          self.near) for rows in spans])
+        cones = cone_set(self.cones)
+
+        def gathered(points, normals):
+            return by_cascade(self.hierarchies, points, lambda hierarchy, rows: irradiance(
+                hierarchy, points[rows], normals[rows], cones, self.beyond, self.step, self.near))
+
+        return np.concatenate([gathered(points[rows], normals[rows]) for rows in spans])
 
 
 def shipped(field) -> ShippedVoxels:
@@ -61,7 +67,7 @@ def shipped(field) -> ShippedVoxels:
         left.append("surfaces beyond the voxel grid, which hide the sky in a bake")
     if field.direct_lamps:
         left.append("the direct light of lamps")
-    return ShippedVoxels(rounded(pack(field.hierarchy)), getattr(settings, "cones", CONES), getattr(settings, "step", STEP),
+    return ShippedVoxels(rounded(pack(field.hierarchies)), getattr(settings, "cones", CONES), getattr(settings, "step", STEP),
                          getattr(settings, "near", NEAR), np.asarray(sky, np.float64).reshape(-1, 3), tuple(left))
 
 

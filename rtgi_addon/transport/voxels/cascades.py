@@ -12,13 +12,14 @@ Source: A. Panteleev, "Practical Real-Time Voxel-Based Global Illumination for C
 Tanner, C. Migdal and M. Jones, "The Clipmap: A Virtual Mipmap", SIGGRAPH 1998.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from .grid import VoxelGrid, grid_around
-from .hierarchy import Hierarchy, Level
+from .hierarchy import Hierarchy, Level, build_hierarchy
+from .voxelize import Voxels
 
 # From the border of a grid, in its cells, the next one answers alone, since samples read neighbours; before that both do over so
 # many.
@@ -62,6 +63,14 @@ def clipmap(finest: tuple[Hierarchy, ...], coarse: tuple[Hierarchy, ...]) -> tup
         levels += [_seen_from(grids[first], grids[-1], level) for level in finest[-1].levels[1:]]
         views.append(Hierarchy(grids[first], tuple(levels), grids[first:] if first < len(grids) - 1 else ()))
     return tuple(views)
+
+
+def nested_hierarchies(grids: Sequence[tuple[Voxels, np.ndarray]]) -> tuple[Hierarchy, ...]:
+    """What receivers in each of nested grids read, finest first: their voxels, and what faces of those show (m, 6, 3),
+    premultiplied."""
+    finest = [build_hierarchy(voxels, radiance, None if index == len(grids) - 1 else 1)
+              for index, (voxels, radiance) in enumerate(grids)]
+    return clipmap(tuple(finest), tuple(build_hierarchy(voxels, radiance, 1, afar=True) for voxels, radiance in grids[1:]))
 
 
 def _seen_from(grid: VoxelGrid, own: VoxelGrid, level: Level) -> Level:

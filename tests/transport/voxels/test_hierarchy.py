@@ -240,8 +240,8 @@ def test_cells_are_too_wide_from_the_walls_twice_their_thickness_on():
 
 def test_lists_keep_where_cells_are_too_wide():
     hierarchy = lit([build.cube("room", 3.0, inward=True), build.cube("block", 0.2)], [[-3, -3, -3], [3, 3, 3.0]], 40)
-    tables = pack(hierarchy)
-    again, numbers = unpack(tables), row_numbers(tables)
+    tables = pack((hierarchy,))
+    (again,), numbers = unpack(tables), row_numbers(tables)
     assert tables.wide.any() and np.array_equal(numbers * 4 % 2 == 1, tables.wide)
     assert all(np.array_equal(one.wide, two.wide) for one, two in zip(hierarchy.levels, again.levels, strict=True))
 

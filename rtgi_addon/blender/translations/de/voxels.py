@@ -40,8 +40,6 @@ VOXELS: dict[str, str] = {
     "the cascades of the voxel grid lie about the scene's camera, and it has none":
         "die Kaskaden des Voxelgitters liegen um die Kamera der Szene, und sie hat keine",
     "add a camera, or set center to volumes": "eine Kamera hinzufügen oder die Mitte auf die Volumen setzen",
-    "{0} has voxels in {1} cascades, and bundles and exports hold one grid: their light goes along in probes alone":
-        "{0} hat Voxel in {1} Kaskaden, und Bündel und Exporte fassen ein Gitter: ihr Licht geht nur in Sonden mit",
     "putting the scene into voxels": "Szene in Voxel zerlegen",
     "lamps on voxels": "Lampen auf Voxeln",
     "light on voxels": "Licht auf Voxeln",

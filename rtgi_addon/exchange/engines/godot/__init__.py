@@ -222,8 +222,8 @@ _ATLAS = """
 _VOXELS = """
 {number}. Voxels: `rtgi/voxel_surface.gdshader` lights a surface by cones through the scene's voxels, pixel by pixel, without
    probes: `var voxels := preload("res://rtgi/voxels.gd").new(); voxels.open("res://rtgi"); voxels.apply_to(material)`. In your own
-   shaders `rtgi_voxels_irradiance` and `rtgi_voxels_mirrored` of `voxels.gdshaderinc`. Check it:
-   `... --script conformance/voxels.gd`.
+   shaders `rtgi_voxels_irradiance` and `rtgi_voxels_mirrored` of `voxels.gdshaderinc`, in scripts for a few points
+   `voxels.irradiance(point, normal)`. Check it: `... --script conformance/voxels.gd`.
    Deutsch: `rtgi/voxel_surface.gdshader` beleuchtet Flächen mit Kegeln durch die Voxel der Szene, Pixel für Pixel und ohne Sonden.
 """, []
 

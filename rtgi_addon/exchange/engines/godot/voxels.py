@@ -10,7 +10,7 @@ from .textures import half_scale, over
 
 INDEX, FOLDER = "voxels.json", "voxels"
 # What goes into a project beside what is written here.
-FILES = ("voxels.gd", "voxel_surface.gdshader")
+FILES = ("voxels.gd", "voxel_cones.gd", "voxel_surface.gdshader")
 _HEAD = """\
 // RTGI's lit voxels: voxels.gd sets the uniforms.
 uniform mat4 rtgi_voxels_cells_from_world = mat4(1.0);
@@ -50,7 +50,8 @@ def write_voxels(folder: Path, voxels: EngineVoxels) -> None:
         write_slices(folder / FOLDER / f"{name}.exr", slices, f"the voxels' {name}")
     grid = voxels.source.tables.grid
     index = {"lists": {name: f"{FOLDER}/{name}.exr" for name in LISTS}, "resolution": list(grid.resolution), "cell": grid.cell,
-             "cones": voxels.source.cones, "cells_from_local": voxels.cells_from_world[:3].tolist()}
+             "cones": voxels.source.cones, "cells_from_local": voxels.cells_from_world[:3].tolist(),
+             "cascades": voxels.cascades, "scales": {"rows": 1.0, **scales}, "lookup": voxels.lookup}
     write_text(folder / INDEX, json.dumps(index, indent=1) + "\n")
     samplers = "".join(_SAMPLER.format(name=name) + "\n" for name in LISTS)
     write_text(folder / "voxels.gdshaderinc", f"{_HEAD.format(samplers=samplers)}{voxels_glsl(voxels, **scales)}{_TAIL}")

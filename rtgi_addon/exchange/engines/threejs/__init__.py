@@ -54,7 +54,8 @@ _FOR_STYLE, _FOR_STYLE_CONFORMANCE = ("rtgi/RTGIStyle.js", "rtgi/RTGIStyle.d.ts"
 _FOR_SPHERES, _FOR_SPHERES_CONFORMANCE = ("rtgi/RTGISpheres.js", "rtgi/RTGISpheres.d.ts"), ("spheres.mjs",)
 _FOR_ATLAS, _FOR_ATLAS_CONFORMANCE = ("rtgi/RTGIAtlas.js", "rtgi/RTGIAtlas.d.ts"), ("atlas.mjs", "conformance/webgl_atlas.js")
 _FOR_ATLAS_RELIGHT_CONFORMANCE = ("atlas_relight.mjs", "conformance/atlas_relight.js")
-_FOR_VOXELS, _FOR_VOXELS_CONFORMANCE = ("rtgi/RTGIVoxels.js", "rtgi/RTGIVoxels.d.ts"), ("conformance/webgl_voxels.js",)
+_FOR_VOXELS = ("rtgi/RTGIVoxels.js", "rtgi/RTGIVoxels.d.ts", "rtgi/voxel_lookup.js")
+_FOR_VOXELS_CONFORMANCE = ("conformance/webgl_voxels.js", "voxels.mjs")
 _SPHERES_README = """
 {number}. Mirrors: `probes.addMirrors(await loadSpheres('rtgi/spheres.json'))` of `rtgi/RTGISpheres.js`, before
    `probes.apply(model)`: materials of WebGLRenderer then show what sphere probes saw. `node spheres.mjs` holds them to RTGI's
@@ -69,7 +70,8 @@ _ATLAS_README = """
 """
 _VOXELS_README = """
 {number}. Voxels: `(await loadVoxels('rtgi/voxels.json')).apply(model)` of `rtgi/RTGIVoxels.js` lights materials of WebGLRenderer by
-   cones through the scene's voxels, pixel by pixel, in place of the probes. `conformance.html?voxels` holds them to RTGI's numbers.
+   cones through the scene's voxels, pixel by pixel, in place of the probes. `conformance.html?voxels` holds them to RTGI's
+   numbers, and `node voxels.mjs` their look-up on the CPU.
    Deutsch: `apply(model)` beleuchtet Materialien statt mit den Sonden mit Kegeln durch die Voxel der Szene, Pixel für Pixel.
 """
 _FOR_TRANSFER = ("day.js", "rtgi/RTGIRelight.js", "rtgi/RTGIRelight.d.ts")

@@ -21,6 +21,7 @@ def write_voxel_files(path: Path, voxels: EngineVoxels) -> None:
     description = {
         "format": FORMAT, "generator": f"RTGI {RTGI_VERSION}", "data": {"file": binary.name, "bytes": len(data)},
         "resolution": list(grid.resolution), "cell": grid.cell, "cones": voxels.source.cones,
-        "cellsFromWorld": voxels.cells_from_world.T.ravel().tolist(),
-        "lists": {name: {"size": [slices[name].shape[axis] for axis in (2, 1, 0)]} for name in LISTS}, "glsl": voxels_glsl(voxels)}
+        "cellsFromWorld": voxels.cells_from_world.T.ravel().tolist(), "cascades": voxels.cascades,
+        "lists": {name: {"size": [slices[name].shape[axis] for axis in (2, 1, 0)]} for name in LISTS}, "glsl": voxels_glsl(voxels),
+        "lookup": voxels.lookup}
     write_text(path, json.dumps(description, indent=1) + "\n")

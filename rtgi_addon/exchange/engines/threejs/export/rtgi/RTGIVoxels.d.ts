@@ -11,6 +11,12 @@ export class RTGIVoxels {
   constructor(description: object, buffer: ArrayBuffer);
   /** Cones of a pixel. */
   readonly cones: number;
+  /** Of each nested grid, finest first, its corners in the world, the side of its cells and its resolution along Blender's axes. */
+  readonly cascades: { low: number[]; high: number[]; cell: number; resolution: number[] }[];
+  /** Irradiance [W/m2] at a point under a unit normal, on the CPU: what materials find there. */
+  irradiance(point: number[], normal: number[]): number[];
+  /** Radiance [W/(sr m2)] that a surface of that roughness mirrors from a unit direction. */
+  mirrored(point: number[], normal: number[], direction: number[], roughness: number): number[];
   /** GLSL of `rtgi_voxels_irradiance` and `rtgi_voxels_mirrored`, for shaders of your own with `uniforms`. */
   readonly declared: string;
   readonly uniforms: Record<string, IUniform>;

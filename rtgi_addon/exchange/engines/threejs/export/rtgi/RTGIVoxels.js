@@ -3,13 +3,16 @@
 //   const voxels = await loadVoxels('rtgi/voxels.json');
 //   voxels.apply(model);
 //
+// voxels.irradiance(point, normal) and voxels.mirrored(point, normal, direction, roughness) ask them on the CPU, for a few points.
 // WebGLRenderer's standard, physical, Lambert, Phong and toon materials take it as they take ambient light. `declared` and `uniforms`
 // are for shaders of your own: rtgi_voxels_irradiance(point, normal) and rtgi_voxels_mirrored(point, normal, direction, roughness).
 
 import {
-  ClampToEdgeWrapping, DataArrayTexture, FileLoader, FloatType, HalfFloatType, LoaderUtils, Matrix4, NearestFilter, RGBAFormat,
-  RedFormat,
+  ClampToEdgeWrapping, DataArrayTexture, DataUtils, FileLoader, FloatType, HalfFloatType, LoaderUtils, Matrix4, NearestFilter, RGBAFormat,
+  RedFormat, Vector3,
 } from 'three';
+
+import { VoxelLookup } from './voxel_lookup.js';
 
 export const VOXELS_FORMAT = 'rtgi-three-voxels/1';
 const TYPES = { rows: [Float32Array, RedFormat, FloatType], cells: [Uint16Array, RGBAFormat, HalfFloatType],
@@ -33,6 +36,8 @@ export class RTGIVoxels {
     this.declared = `${uniformPars}${description.glsl}${functions}`;
     this.uniforms = { rtgiVoxelsCellsFromWorld: { value: new Matrix4().fromArray(description.cellsFromWorld) },
       rtgiVoxelsIntensity: { value: 1 } };
+    this.cascades = description.cascades;
+    this.lookup = description.lookup;
     let begin = 0;
     for (const [name, [Values, format, type]] of Object.entries(TYPES)) {
       const [width, height, depth] = description.lists[name].size, count = width * height * depth * (format === RedFormat ? 1 : 4);
@@ -43,6 +48,35 @@ export class RTGIVoxels {
         wrapT: ClampToEdgeWrapping, unpackAlignment: 1, needsUpdate: true });
       this.uniforms[`rtgi_voxel_${name}`] = { value: texture };
     }
+  }
+
+  // Irradiance [W/m2] as [r, g, b] at a point of a surface under a unit normal, [x, y, z] each: what materials find there.
+  irradiance(point, normal) {
+    return this.cpu().irradiance(this.cellsOf(point), this.turned(normal));
+  }
+
+  // Radiance [W/(sr m2)] as [r, g, b] that a surface of that roughness mirrors from a direction.
+  mirrored(point, normal, direction, roughness) {
+    const alpha = Math.min(roughness * roughness, 0.5);
+    return this.cpu().seen(this.cellsOf(point), this.turned(direction), this.turned(normal), 2 * alpha / (1 - alpha * alpha));
+  }
+
+  // The lists as numbers, read when they are first asked for.
+  cpu() {
+    if (!(this.lookup instanceof VoxelLookup)) {
+      const [rows, cells, light] = ['rows', 'cells', 'light'].map((name) => this.uniforms[`rtgi_voxel_${name}`].value.image.data);
+      const [ofCells, ofLight] = [cells, light].map((halves) => Float32Array.from(halves, DataUtils.fromHalfFloat));
+      this.lookup = new VoxelLookup(this.lookup, rows, ofCells, ofLight);
+    }
+    return this.lookup;
+  }
+
+  cellsOf(point) {
+    return new Vector3(...point).applyMatrix4(this.uniforms.rtgiVoxelsCellsFromWorld.value).toArray();
+  }
+
+  turned(direction) {
+    return new Vector3(...direction).transformDirection(this.uniforms.rtgiVoxelsCellsFromWorld.value).toArray();
   }
 
   // Have the materials of `object`, a material or what has some, lit by cones, and return this. Ambient light adds to it.
