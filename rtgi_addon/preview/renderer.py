@@ -210,6 +210,12 @@ class PreviewRenderer:
             self.reset()
         return changed
 
+    def look_from(self, eye: np.ndarray) -> None:
+        """Tell light that a worker makes about a viewer where ``eye`` (3,) is: of a viewport, which is no camera of the scene."""
+        look_from = getattr(self._indirect, "look_from", None)
+        if look_from is not None:
+            look_from(eye)
+
     def frame(self, view: CameraView, size: tuple[int, int]) -> None:
         """Average one more sample of ``view`` in, at ``size`` (width, height) pixels before the resolution scale; another view or
         size begins anew."""

@@ -36,6 +36,8 @@ class Picture:
             self.renderer.configure(settings, (settings.mode,), effects)
             self._settings, self._effects, self._seen = settings, effects, None
         self.renderer.update(scene)
+        if shown.live is not None:
+            self.renderer.look_from(seen.world_from_camera[:3, 3])
         if seen.equals(self._seen) and size == self._size and self.renderer.samples >= settings.samples:
             if not self.renderer.busy:
                 return

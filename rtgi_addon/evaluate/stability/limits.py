@@ -38,6 +38,7 @@ LIMITS: dict[str, dict[str, Limit]] = {
     "voxel-steps": {"cone_tracing": Limit(0.03, _MIXED), "voxel_march": Limit(0.25, "the noise of 32 rays")},
     "voxel-motion": {"cone_tracing": Limit(0.009, _WHOLE), "voxel_march": Limit(0.016, _WHOLE)},
     "voxel-cascades": {"cone_tracing": Limit(0.005), "voxel_march": Limit(0.005)},
+    "voxel-dolly": {"cone_tracing": Limit(0.002), "voxel_march": Limit(0.001)},
     "voxel-pole": {"cone_tracing": Limit(0.12, "the pole falls between cones, or fills one"), "voxel_march": Limit(0.025, _WHOLE)},
     "voxel-corner": {"cone_tracing": Limit(0.19, _WHOLE), "voxel_march": Limit(0.28, _WHOLE)},
     "probe-in-geometry": {

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...scene import Camera
 from ...transport.context import LightContext
 from ...transport.paths.reference import irradiance_at
 from .case import Bench, Case, Sample, Variant
@@ -71,12 +72,16 @@ def _motion(bench: Bench) -> list[Sample]:
     return [Sample(f"{FRAMES} frames of {CREEP:g} voxels", flicker(np.array(frames)), built, field)]
 
 
-def _border(bench: Bench) -> list[Sample]:
-    """Two nested grids about a probe volume that is carried along a floor: the border of the finer one crosses the receivers."""
+def _along_the_floor() -> tuple[np.ndarray, np.ndarray]:
     x, y = np.meshgrid(np.linspace(-0.9, 0.9, 25), np.linspace(-0.5, 0.5, 3))
     points = np.stack([x.ravel(), y.ravel() - 0.4, np.full(x.size, -0.999)], axis=1).astype(np.float32)
     points = points[(np.abs(points[:, 1]) > 0.45) | (points[:, 0] < -0.15)]
-    normals = np.tile(np.float32([0, 0, 1]), (len(points), 1))
+    return points, np.tile(np.float32([0, 0, 1]), (len(points), 1))
+
+
+def _border(bench: Bench) -> list[Sample]:
+    """Two nested grids about a probe volume that is carried along a floor: the border of the finer one crosses the receivers."""
+    points, normals = _along_the_floor()
     frames, field, built = [], None, None
     for frame in range(FRAMES):
         along = -0.3 + 0.5 * _FINEST * frame
@@ -84,6 +89,24 @@ def _border(bench: Bench) -> list[Sample]:
         field = bench.bake(built, **{**_quick(bench), "voxel_size": _FINEST, "cascades": 2, "reach": 20.0, "rays": 256})
         frames.append(brightness(field, points, normals))
     return [Sample(f"{FRAMES} frames of half a voxel", flicker(np.array(frames)), built, field)]
+
+
+def _dolly(bench: Bench) -> list[Sample]:
+    """Two nested grids about a camera that goes on by less than a voxel a frame, and by more than one in all, so that they snap;
+    nothing in the scene moves."""
+    points, normals = _along_the_floor()
+    before, samples = None, []
+    for step in range(5):
+        world_from_camera = np.eye(4)
+        world_from_camera[:3, 3] = -0.5 + 0.3 * _FINEST * step, -0.4, -0.7
+        camera = Camera("camera", world_from_camera, np.eye(4), (64, 36))
+        built = replace(room_with_block(), cameras=(camera,))
+        field = bench.bake(built, **{**_quick(bench), "voxel_size": _FINEST, "cascades": 2, "center": "camera", "rays": 256})
+        frame = brightness(field, points, normals)
+        if before is not None:
+            samples.append(Sample(f"frame {step}", rms_change(frame, before), built, field))
+        before = frame
+    return samples
 
 
 def _pole(bench: Bench) -> list[Sample]:
@@ -135,6 +158,9 @@ CASES = (
     Case("voxel-cascades", "light steps where the border of a finer grid passes", "a room with a block, two grids on the move",
          "RMS over eight frames of what is left after a straight line in time, over the mean", "half a finest voxel a frame",
          0.005, _border, SIX),
+    Case("voxel-dolly", "cascades pop as the camera moves by less than a voxel", "a room with a block, two grids about a camera",
+         "RMS change from one frame to the next, over the mean; the truth is 0", "frames 0.3 of a finest voxel apart", 0.01, _dolly,
+         SIX),
     Case("voxel-pole", "what is thinner than a voxel hides too much or too little", "a pole on a floor under a grey sky",
          "deviation of the irradiance around its foot from path tracing", "the pole's width", 0.02, _pole, SIX),
     Case("voxel-corner", "a corner within a voxel is lost", "a black floor at a glowing wall",

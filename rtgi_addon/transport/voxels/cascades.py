@@ -26,12 +26,20 @@ from .voxelize import Voxels
 EDGE, BLEND = 1.5, 2.0
 # Fewer cells along any side leave nothing between the blends of one grid and of the next.
 FEWEST = 18
+# Nested grids are at least this share of their longest side wide along the others.
+FLATTEST = 0.45
 
 
 def nested(box: np.ndarray, resolution: int, count: int, center: np.ndarray, cell: float | None = None) -> tuple[VoxelGrid, ...]:
     """``count`` grids, finest first: the outermost around ``box`` (2, 3) [m] with ``resolution`` cells along its longest side, or
-    with the cells that make the finest have the side ``cell`` [m]; those within it have half of its extent, half of that and so on
-    about ``center`` (3,), as far as they stay within it. Raises BakeError for more cells than there can be."""
+    with the cells that make the finest have the side ``cell`` [m], and higher where it would be flat; those within it have half of
+    its extent, half of that and so on about ``center`` (3,), as far as they stay within it. Raises BakeError for more cells than
+    there can be."""
+    if count > 1:
+        # Of a flat scene the finer ones would be flat as well, and reach no floor under who stands on it.
+        middle, extent = box.mean(axis=0), box[1] - box[0]
+        extent = np.maximum(extent, FLATTEST * extent.max())
+        box = np.stack([middle - 0.5 * extent, middle + 0.5 * extent])
     outermost = grid_around(box, resolution, None if cell is None else cell * 2.0 ** (count - 1))
     if count == 1:
         return (outermost,)

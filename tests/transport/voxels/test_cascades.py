@@ -47,6 +47,15 @@ def test_grids_are_nested_and_lie_on_lattices_of_their_own_cells():
     assert nested(BOX, 48, 3, BOX.mean(axis=0), 0.05)[0].cell == pytest.approx(0.05)
 
 
+def test_grids_of_a_flat_courtyard_reach_the_floor_under_a_camera():
+    court, eye = np.array([[-30.0, -30.0, 0.0], [30.0, 30.0, 10.0]]), np.array([3.0, -2.0, 1.6])
+    grids = nested(court, 64, 4, eye)
+    assert grids[0].cell == pytest.approx(60.0 / 62 / 8, rel=0.05) and min(grids[0].resolution) >= 28
+    for grid in grids:
+        assert np.all(np.array(grid.corner) < eye - 1.65) and np.all(grid.high > eye + 1.65)
+    assert nested(court, 64, 1, eye)[0].resolution[2] < 18
+
+
 def test_a_centre_that_moves_by_less_than_half_a_cell_changes_nothing():
     center = np.array([0.1, 0.1, 0.9])
     grids = nested(BOX, 48, 3, center)
