@@ -93,7 +93,7 @@ def test_constants_that_are_settings_of_the_code():
     from rtgi_addon.transport.surfaces.materials import MAX_ALBEDO
     assert f"capped at {MAX_ALBEDO}" in TEXT and BACKFACE_THRESHOLD == 0.25 and "more than a quarter" in TEXT
     assert weights.CRUSH_BELOW == weights.SIDE_FLOOR == 0.2 and "below 0.2 are crushed" in TEXT
-    assert weights.UNSEEN_FLOOR == 1e-4 and "one of 10⁻⁴" in TEXT
+    assert weights.UNSEEN_FLOOR == 1e-6 and "one of 10⁻⁶" in TEXT
     assert placement.MAX_OFFSET == 0.45 and "45 % of a cell" in TEXT and placement.CLEARANCE == 0.05 and "5 % of a cell" in TEXT
     assert metrics.relmse.__defaults__ == (1e-2,) and "ε = 10⁻²" in TEXT
 

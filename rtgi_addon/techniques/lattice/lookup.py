@@ -6,7 +6,7 @@ little) × (½(1 − x/√(1 + x²)))², x = (r − μ)/σ, for how surely the p
 The eight are those about a point a little off the surface, so that one which lies on a plane of probes reads those in front of it.
 
 Where DDGI keeps a visibility of at least 0.05, which leaves 0.3 % of a lit room in the black one behind a thin wall, all
-weights here share a floor of 1e-4 of the plain trilinear weight: it decides only where no neighbour sees the point, and makes
+weights here share a floor of 1e-6 of the plain trilinear weight: it decides only where no neighbour sees the point, and makes
 the answer there the trilinear one over the live probes. Where none of the eight is live, dilated coefficients take over.
 
 Scattered probes stand on no lattice. There each node of a lattice over the volume names some probes that see it, with shares

@@ -21,8 +21,10 @@ from ...scene.scattered import SHARES, WORD
 SIDE_FLOOR = 0.2
 # Weights below this are crushed to w³ over its square.
 CRUSH_BELOW = 0.2
-# What every live probe counts more, in shares of its trilinear weight; and every probe, for points that have no live one.
-UNSEEN_FLOOR, DILATED_FLOOR = 1e-4, 1e-12
+# What every live probe counts more, in shares of its trilinear weight; and every probe, for points that have no live one. Close to
+# the corner between a wall and the floor the probe that sees a point is itself hardly sure of it (its texel there sees both), and
+# crushed to 1e-5: what counts more than that lets the one behind the wall speak as loud.
+UNSEEN_FLOOR, DILATED_FLOOR = 1e-6, 1e-12
 # The eight neighbours are those about a point lifted off its surface by this share of the bias, a twenty-fifth of a cell: enough
 # for a surface that lies on a plane of probes to read the layer in front of it, and too little to matter in the open.
 LIFT = 0.2

@@ -5,7 +5,7 @@ extends RefCounted
 # The numbers of irradiance.gdshaderinc.
 const SIDE_FLOOR := 0.2
 const CRUSH_BELOW := 0.2
-const UNSEEN_FLOOR := 1e-4
+const UNSEEN_FLOOR := 1e-6
 const DILATED_FLOOR := 1e-12
 const LIFT := 0.2
 const AT_PROBE := 1e-6

@@ -13,7 +13,7 @@ export const COEFFICIENTS = 9;
 // The numbers of weights.js, for this file and RTGIProbeLight.js.
 export const SIDE_FLOOR = 0.2;
 export const CRUSH_BELOW = 0.2;
-export const UNSEEN_FLOOR = 1e-4;
+export const UNSEEN_FLOOR = 1e-6;
 export const DILATED_FLOOR = 1e-12;
 export const LIFT = 0.2;
 export const AT_PROBE = 1e-6;
