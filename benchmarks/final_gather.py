@@ -96,10 +96,10 @@ def draw_within(scene: Scene, error: float, chosen: Chosen, threads: int | None)
     """The picture (h, w, 3) that is thought to be within ``error``, row 0 at the top; the mean of its pixels' samples, what its
     error is thought to be, CPU seconds, and what shows a surface."""
     started = user_seconds()
-    drawn = draw_pictures(light_context(scene, threads), None, CameraView.of(scene.cameras[0]), SIZE, shown=("combined", "direct"),
+    drawn = draw_pictures(light_context(scene, threads), None, CameraView.of(scene.cameras[0]), SIZE, shown=("combined", "albedo"),
                           samples=MOST_SAMPLES, error=error, effects=[chosen], threads=threads)
-    seconds, (picture, direct) = user_seconds() - started, (np.flipud(drawn.pictures[name]) for name in ("combined", "direct"))
-    return picture[..., :3], drawn.samples, drawn.error, seconds, direct[..., 3] > 0.999
+    seconds, (picture, albedo) = user_seconds() - started, (np.flipud(drawn.pictures[name]) for name in ("combined", "albedo"))
+    return picture[..., :3], drawn.samples, drawn.error, seconds, albedo[..., 3] > 0.999
 
 
 def errors(found: np.ndarray, cycles: np.ndarray, seen: np.ndarray) -> tuple[float, float, float]:

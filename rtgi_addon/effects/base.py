@@ -5,7 +5,7 @@ one returns. Reflections therefore show surfaces without the medium between, med
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields, replace
 from typing import ClassVar
 
@@ -68,6 +68,12 @@ class Effect(ABC):
     def gathering(self, settings, times: float):
         """``settings`` with ``times`` as many rays for the light that it keeps as GATHERED: the same where it gathers none."""
         return settings
+
+    def lamps(self, settings) -> Callable | None:
+        """What draws the light of lamps for it alone, in place of ``lit.direct_light`` and called as that is with (context,
+        gbuffer, view, index), in frames without a field whose lit picture nobody else asks for: these are ``Frame.bare``. None:
+        it takes frames as all do."""
+        return None
 
     def has_gpu_half(self, settings) -> bool:
         """Whether its half on the GPU, if it has one of its own, does what ``settings`` ask for."""

@@ -79,6 +79,9 @@ class Frame:
     what effects deliver beside their picture (Effect.passes), ``kept`` by their names what they remember for the sample that
     follows, which finds it in ``history.frame``.
 
+    A ``bare`` one is for one effect alone, which gathers light itself: ``direct`` is what its ``Effect.lamps`` draws, and
+    ``irradiance`` nothing.
+
     With ``samples`` it is a row of those, h = 1 and w = n, in which neighbours are none, and ``index`` and ``offset`` are None:
     each has its own.
     """
@@ -97,6 +100,7 @@ class Frame:
     passes: dict[str, np.ndarray] = field(default_factory=dict)
     kept: dict[str, object] = field(default_factory=dict)
     samples: Samples | None = None
+    bare: bool = False
 
     @property
     def size(self) -> tuple[int, int]:
@@ -163,10 +167,13 @@ class Frame:
 
     def lit(self) -> "Frame":
         """This frame with ``light`` as its surfaces are lit: direct + albedo·irradiance/π + emission, over the background."""
-        light, seen = np.zeros((*self.gbuffer.seen.shape, 4), np.float32), self.gbuffer.seen
-        if not seen.all():
-            light[~seen] = self.background[~seen]
-        indirect = self.gbuffer.albedo[seen][:, :3] * self.irradiance[seen][:, :3] * np.float32(1.0 / np.pi)
-        light[seen, :3] = self.direct[seen][:, :3] + indirect + self.gbuffer.emission[seen][:, :3]
-        light[seen, 3] = 1.0
-        return replace(self, light=light)
+        gbuffer, rows = self.gbuffer, self.gbuffer.rows
+        everything = len(rows) == gbuffer.seen.size
+        light = np.zeros((len(rows), 4), np.float32) if everything else self.background.reshape(-1, 4).copy()
+        shown = gbuffer.shown(gbuffer.albedo) * gbuffer.shown(self.irradiance)
+        shown *= np.float32(1.0 / np.pi)
+        shown += gbuffer.shown(self.direct)
+        shown += gbuffer.shown(gbuffer.emission)
+        shown[:, 3] = 1.0
+        light[rows] = shown
+        return replace(self, light=light.reshape(*gbuffer.seen.shape, 4))

@@ -48,36 +48,40 @@ class SeenSurfaces(NamedTuple):
 
 def draw_frame(scene: Scene | LightContext, field: Field | None, view: CameraView, size: tuple[int, int], *, index: int = 0,
                offset=(0.0, 0.0), lamp_points: int = 1, transparent: bool = False, history: History | None = None,
-               threads: int | None = None) -> Frame:
+               threads: int | None = None, lamps: Callable | None = None) -> Frame:
     """Sample number ``index`` of a picture of ``size`` (width, height) pixels, shifted by ``offset`` (2,) pixels, in the light of
     ``field`` (None: the world's own, with nothing in its way). Every wide lamp is seen through ``lamp_points`` of its points,
-    others in every sample. A LightContext in place of ``scene`` saves building one. The same for any number of
-    ``threads``."""
+    others in every sample; with ``lamps`` (Effect.lamps) the frame is bare. A LightContext in place of ``scene`` saves building
+    one. The same for any number of ``threads``."""
     context = scene if isinstance(scene, LightContext) else light_context(scene, threads)
     scene = context.scene if isinstance(scene, LightContext) else scene
     gbuffer = empty_gbuffer(size) if context is None else draw_gbuffer(context, view, size, offset)
-    direct, irradiance = _arriving(context, field, gbuffer, view, index, lamp_points)
-    frame = Frame(scene, view, gbuffer, direct, irradiance, direct, index, tuple(offset), transparent, history, lambda: context)
+    direct, irradiance = _arriving(context, field, gbuffer, view, index, lamp_points, lamps)
+    frame = Frame(scene, view, gbuffer, direct, irradiance, direct, index, tuple(offset), transparent, history, lambda: context,
+                  bare=lamps is not None)
     return frame.lit()
 
 
 def draw_samples(context: LightContext, field: Field | None, view: CameraView, samples: Samples, *,
-                 transparent: bool = False) -> Frame:
+                 transparent: bool = False, lamps: Callable | None = None) -> Frame:
     """As ``draw_frame``, of single pixels: what it draws in these ``samples``."""
     gbuffer = draw_places(context, view, *samples.places())
-    direct, irradiance = _arriving(context, field, gbuffer, view, samples.index[gbuffer.seen[0]])
+    direct, irradiance = _arriving(context, field, gbuffer, view, samples.index[gbuffer.seen[0]], lamps=lamps)
     return Frame(context.scene, view, gbuffer, direct, irradiance, direct, None, None, transparent, None, lambda: context,
-                 samples=samples).lit()
+                 samples=samples, bare=lamps is not None).lit()
 
 
 def _arriving(context: LightContext | None, field: Field | None, gbuffer: GBuffer, view: CameraView, index: int | np.ndarray,
-              lamp_points: int = 1) -> tuple[np.ndarray, np.ndarray]:
+              lamp_points: int = 1, lamps: Callable | None = None) -> tuple[np.ndarray, np.ndarray]:
     """``direct`` and ``irradiance`` of a frame (h, w, 4)."""
     direct, irradiance = np.zeros((2, *gbuffer.position.shape), np.float32)
     if context is not None:
         held = frozenset() if field is None else field.direct_lamps
-        direct[gbuffer.seen] = direct_light(context, gbuffer, view, index, lamp_points, held)
-        irradiance[gbuffer.seen, :3] = indirect_irradiance(context, field, gbuffer, index)
+        if lamps is not None:
+            direct.reshape(-1, 4)[gbuffer.rows] = lamps(context, gbuffer, view, index)
+            return direct, irradiance
+        direct.reshape(-1, 4)[gbuffer.rows] = direct_light(context, gbuffer, view, index, lamp_points, held)
+        irradiance.reshape(-1, 4)[gbuffer.rows, :3] = indirect_irradiance(context, field, gbuffer, index)
     return direct, irradiance
 
 
@@ -86,7 +90,7 @@ def direct_light(context: LightContext, gbuffer: GBuffer, view: CameraView, inde
     """Radiance [W·sr⁻¹·m⁻²] that the n pixels in ``gbuffer.seen`` reflect towards the eye of ``view`` of all lamps but those
     whose direct light a bake holds (``held`` as ``Field.direct_lamps``), and the luminance of their irradiance [W·m⁻²]: (n, 4);
     in the sample number ``index`` of the picture, or (n,) each in its own."""
-    surfaces, instance = seen_surfaces(gbuffer, view), gbuffer.albedo[gbuffer.seen][:, 3].astype(np.int64)
+    surfaces, instance = seen_surfaces(gbuffer, view), gbuffer.shown(gbuffer.albedo)[:, 3].astype(np.int64)
     return lamps_on(context, surfaces, instance, index, lamp_points, held)
 
 
@@ -131,13 +135,14 @@ def seen_surfaces(gbuffer: GBuffer, view: CameraView) -> SeenSurfaces:
 
 
 def _seen_surfaces(gbuffer: GBuffer, view: CameraView) -> SeenSurfaces:
-    seen = gbuffer.seen
-    points, normals, faces = (getattr(gbuffer, name)[seen][:, :3] for name in ("position", "normal", "geometry"))
+    shown = {name: gbuffer.shown(target) for name, target in gbuffer.items()}
+    # Dense, as kernels take them.
+    points, normals, faces = (np.ascontiguousarray(shown[name][:, :3]) for name in ("position", "normal", "geometry"))
     towards_eye = normalized(view.position.astype(np.float32) - points)
     if view.orthographic:
         towards_eye = np.broadcast_to(-view.forward.astype(np.float32), points.shape)
-    base, roughness = gbuffer.base_color[seen], gbuffer.emission[seen][:, 3]
-    look = surface_look(gbuffer.albedo[seen][:, :3], base[:, :3], base[:, 3], roughness, gbuffer.geometry[seen][:, 3],
+    base, roughness = shown["base_color"], shown["emission"][:, 3]
+    look = surface_look(shown["albedo"][:, :3], base[:, :3], base[:, 3], roughness, shown["geometry"][:, 3],
                         np.clip(dot(normals, towards_eye), 0.0, 1.0))
     return SeenSurfaces(points, normals, faces, towards_eye, look)
 
@@ -146,7 +151,7 @@ def indirect_irradiance(context: LightContext, field: Field | None, gbuffer: GBu
     """Irradiance (n, 3) [W·m⁻²] of ``field`` at the n pixels in ``gbuffer.seen``, of its light atlas where the surface is in it; of
     the world's own light for None. What emissive surfaces give others closer than probes are apart is that of the sample number
     ``index`` of the picture, or (n,) each its own (techniques/lattice/near_light.py)."""
-    points, normals = gbuffer.position[gbuffer.seen][:, :3], gbuffer.normal[gbuffer.seen][:, :3]
+    points, normals = gbuffer.shown(gbuffer.position)[:, :3], gbuffer.shown(gbuffer.normal)[:, :3]
     scene = context.scene
     if field is None:
         return unshadowed_irradiance(scene.world, normals)

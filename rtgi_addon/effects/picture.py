@@ -66,14 +66,17 @@ def draw_pictures(scene: Scene | LightContext, field: Field | None, view: Camera
     once, averaged = (tuple(name for name in shown if (name in NOT_AVERAGED) == kept) for kept in (True, False))
     applied = "combined" in shown or error is not None or any(name in EFFECT_PASSES for name in shown)
     film, single, light = Film(size, averaged), {}, KeptLight()
+    # The lit picture need not be whole where none but one effect, which gathers light itself, asks for it.
+    alone = applied and field is None and len(effects) == 1 and "direct" not in shown
+    lamps = effects[0].effect.lamps(effects[0].settings) if alone else None
 
     def sample(index: int, before: History | None = None, times: float = 1.0) -> Frame:
         frame = draw_frame(scene if context is None else context, field, view, size, index=index, offset=sample_offset(index),
-                           transparent=transparent, history=before)
+                           transparent=transparent, history=before, lamps=lamps)
         return apply_all(frame, field, _gathering(effects, times)) if applied else frame
 
     def single_pixels(samples: Samples) -> Frame:
-        return apply_all(draw_samples(context, field, view, samples, transparent=transparent), field, effects)
+        return apply_all(draw_samples(context, field, view, samples, transparent=transparent, lamps=lamps), field, effects)
 
     first = (1 if not averaged else samples) if error is None else min(samples, FIRST)
     local = error is not None and context is not None and all(entry.effect.local for entry in effects)

@@ -48,12 +48,14 @@ SIGNATURES = {
     "covered": "vppFIqBpqLB",
     "apart": "qppFfpqLBIpBiB",
     "lowest_irradiance": "vqiqDqDDdqqDDD",
-    "window_strength": "vqqqDqDqD",
     "project_texels": "vqqqqFqFIFF",
     "surface_look": "vFiiqFFFFFFFFFFFFF",
     "sample_reflection": "vqFFFFFFFFFF",
     "kept_light": "vqFHFfqLFFFFFF",
     "share_light": "vqqqFFFFBqFFfFF",
+    "cosine_rays": "qpqpUiqqUUFFFFFFIIFFFIF",
+    "gathered": "vqqFFFqLFF",
+    "layer_parts": "vqqDDqFD",
     "prepare": "v",
 }
 _NUMBERS = {"q": ctypes.c_int64, "i": ctypes.c_int32, "f": ctypes.c_float, "d": ctypes.c_double}

@@ -78,11 +78,11 @@ def sobol_owen_at(index: np.ndarray, dims: int, seed, shuffle: bool = False, fir
         shape = np.broadcast_shapes(index.shape, seed.shape)
         index, seed = (np.ascontiguousarray(np.broadcast_to(part, shape)).reshape(-1) for part in (index, seed))
         points = np.empty((*shape, dims - first), np.float32)
-        kernels.call("sobol_owen", _sobol_tables(), SOBOL_DIMENSIONS, index.size, index, seed, first, dims, points)
+        kernels.call("sobol_owen", sobol_tables(), SOBOL_DIMENSIONS, index.size, index, seed, first, dims, points)
         return points
     octets = [(index >> np.uint32(shift)) & np.uint32(255) for shift in (0, 8, 16, 24)]
     points = np.empty((*np.broadcast_shapes(index.shape, seed.shape), dims - first), np.float32)
-    tables = _sobol_tables()
+    tables = sobol_tables()
     for d in range(first, dims):
         reversed_bits = tables[d, 0][octets[0]]
         for table, octet in zip(tables[d, 1:], octets[1:], strict=True):
@@ -215,7 +215,7 @@ def unit_interval(x: np.ndarray) -> np.ndarray:
 
 
 @cache
-def _sobol_tables() -> np.ndarray:
+def sobol_tables() -> np.ndarray:
     """(dimension, octet, 256) uint32: the bit-reversed Sobol point of every value of each octet of the index; the point of a
     whole index is the XOR over its octets."""
     directions = np.zeros((SOBOL_DIMENSIONS, 32), np.uint32)

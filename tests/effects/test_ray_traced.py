@@ -10,8 +10,9 @@ import room_scenes as rooms
 import scene_builders as build
 from picture_stage import SIZE, stage, view
 
-from rtgi_addon.effects import get
+from rtgi_addon.effects import Chosen, get
 from rtgi_addon.effects.lit import SeenSurfaces, draw_frame, lamps_on, light_context, seen_surfaces
+from rtgi_addon.effects.picture import draw_pictures
 from rtgi_addon.effects.ray_traced import spacing_of
 from rtgi_addon.effects.ray_traced.receivers import Pixels, _in_turn
 from rtgi_addon.scene import AreaLight, Channel, ClosedMesh, Medium, PointLight, SunLight, World
@@ -216,6 +217,17 @@ def test_what_is_met_and_what_is_sampled_of_lamps_add_up(roughness):
     once = traced(frames[0], glossy_rays=8, reflections=1, diffuse_rays=0)
     if roughness < 0.2:
         assert np.square(once - expected).mean() < 0.2 * np.square(frames[0].direct[..., :3] - expected).mean()
+
+
+@pytest.mark.parametrize("diffuse_rays, budget", [(2, 0.5), (8, 0.001), (0, 0.5)])
+def test_a_picture_for_it_alone_is_the_same(diffuse_rays, budget):
+    """Frames that nobody else asks for lack what it replaces: light of lamps that mirrored rays meet, and the field's."""
+    scene = replace(build.open_plane(0.5), materials=(metal(0.1),), lights=tuple(LAMPS_IN_MIRRORS))
+    chosen = [Chosen(EFFECT, EFFECT.Settings(diffuse_rays=diffuse_rays, budget=budget))]
+    alone, beside = (draw_pictures(scene, None, view(), (24, 16), shown=shown, samples=2, effects=chosen).pictures["combined"]
+                     for shown in (("combined",), ("combined", "direct")))
+    np.testing.assert_allclose(alone, beside, rtol=1e-5, atol=1e-6)
+    assert alone[..., :3].max() > 1.0
 
 
 def test_mirrors_in_mirrors_show_highlights_of_lamps():

@@ -18,7 +18,7 @@ def corner():
     normal = np.where(wall[..., None], np.float32([-1, 0, 0, 0]), np.float32([0, 0, 1, 0]))
     gbuffer = SimpleNamespace(seen=np.ones(SHAPE, bool), position=position, normal=normal)
     return SimpleNamespace(gbuffer=gbuffer, footprint=np.ones(SHAPE, np.float32), irradiance=np.zeros((*SHAPE, 4), np.float32),
-                           samples=None, index=0)
+                           samples=None, index=0, bare=False)
 
 
 def shared(light, known=None, spacing=1, nearness=0.01):

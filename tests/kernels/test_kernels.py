@@ -15,6 +15,7 @@ import scene_builders as build
 from rtgi_addon import kernels
 from rtgi_addon.effects.frame import GATHERED
 from rtgi_addon.effects.kept_light import KeptLight
+from rtgi_addon.effects.ray_traced.diffuse import _means
 from rtgi_addon.effects.ray_traced.smoothing import smoothed
 from rtgi_addon.numerics import octahedral, sampling, sh
 from rtgi_addon.progress import Progress
@@ -23,9 +24,11 @@ from rtgi_addon.techniques import get
 from rtgi_addon.techniques.lattice.reconstruction import dering
 from rtgi_addon.techniques.vpl.gather import gather
 from rtgi_addon.techniques.vpl.virtual_lights import VirtualLights
+from rtgi_addon.transport.cache.look import CachedScene
 from rtgi_addon.transport.cache.texels import Focus, TexelLayout
 from rtgi_addon.transport.context import LightContext
 from rtgi_addon.transport.lights.lamps import LampTable
+from rtgi_addon.transport.paths.numbers import PathNumbers
 from rtgi_addon.transport.rays import embree, embree_scene
 from rtgi_addon.transport.surfaces import ggx
 from rtgi_addon.transport.surfaces.geometry import flatten
@@ -261,6 +264,40 @@ def test_surfaces_reflect_alike(rng):
     assert_close(lambda: ggx.sample_reflection(look, normals, towards, numbers), 2e-5)
 
 
+def test_layers_reflect_alike_in_all():
+    def table():
+        ggx.energy_table.cache_clear()
+        return [ggx.energy_table()]
+
+    assert_close(table, 1e-6)
+
+
+@traces
+@pytest.mark.parametrize("rays", [1, 3, 8])
+def test_rays_of_pixels_are_the_same(rays, rng):
+    context = LightContext(replace(rooms.panel_room(0.6), cameras=()))
+    scene = CachedScene.about(context, np.zeros(3), 1.0)
+    points, normals = np.float32(rng.uniform(-0.9, 0.9, (101, 3))), normalized(np.float32(rng.normal(size=(101, 3))))
+    faces = normalized(normals + np.float32(0.5) * np.float32(rng.normal(size=(101, 3))))
+    numbers = PathNumbers(np.repeat(rng.integers(0, 2**32, 101, np.uint32), rays), np.tile(np.arange(rays), 101))
+    radiance = np.float32(rng.random((101 * rays, 3)))
+
+    def work():
+        looks = scene.look_about(points, normals, faces, numbers, rays)
+        return looks, _means(looks, radiance, faces, rays)
+
+    (ours, mean), (numpys, numpys_mean) = both(work)
+    np.testing.assert_array_equal(ours.rows, numpys.rows)
+    for name in ("primitive", "slots"):
+        # Rounding may move a hit over the edge of a triangle or a texel.
+        assert np.mean(getattr(ours.hits, name) == getattr(numpys.hits, name)) > 0.99
+    for name in ("origins", "directions", "t", "density"):
+        a, b = getattr(ours, name), getattr(numpys, name)
+        np.testing.assert_allclose(a, b, rtol=1e-4, atol=1e-5, err_msg=name)
+    assert np.mean(np.abs(ours.cosine - numpys.cosine) < 1e-5) > 0.99
+    np.testing.assert_allclose(mean, numpys_mean, rtol=1e-4)
+
+
 @pytest.mark.parametrize("spacing", [1, 3])
 def test_pixels_share_light_alike(spacing, rng):
     rows, columns = np.indices((40, 60)).astype(np.float32)
@@ -268,7 +305,7 @@ def test_pixels_share_light_alike(spacing, rng):
     seen = rng.random((40, 60)) < 0.95
     gbuffer = SimpleNamespace(position=np.stack([columns, rows, np.sin(columns / 5), 0 * rows], axis=-1),
                               normal=normals * seen[..., None], seen=seen)
-    frame = SimpleNamespace(gbuffer=gbuffer, footprint=np.full((40, 60), np.float32(0.9)), samples=None, index=3,
+    frame = SimpleNamespace(gbuffer=gbuffer, footprint=np.full((40, 60), np.float32(0.9)), samples=None, index=3, bare=False,
                             irradiance=np.ones((40, 60, 4), np.float32))
     light, known = np.float32(rng.random((40, 60, 4))), rng.random((40, 60)) < 1.0 / spacing**2
     assert_close(lambda: [smoothed(frame, light, known, spacing)], 1e-4)

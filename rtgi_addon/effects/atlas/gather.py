@@ -171,7 +171,7 @@ class TexelGather:
 
     def inside(self, rows: np.ndarray, look: Looks) -> np.ndarray:
         """(n,) bool: rays that leave places inside solids."""
-        behind = dot(look.fronts, look.directions[look.rows]) > 0
+        behind = look.cosine < 0
         met = np.zeros(len(rows))
         met[look.rows[behind]] = self.context.solids.is_solid(look.hits.primitive[behind])
         place, index, count = np.unique(rows, return_inverse=True, return_counts=True)

@@ -141,8 +141,7 @@ class _Columns:
         hits, filters = look.hits, tint[look.rows]
         of_albedo = filters
         if by_hit:
-            towards = -dot(look.fronts, look.directions[look.rows])
-            of_albedo = filters * self._context.surfaces.albedo(hits.primitive, hits.u, hits.v, towards)
+            of_albedo = filters * self._context.surfaces.albedo(hits.primitive, hits.u, hits.v, look.cosine)
         result = np.zeros((count, NUMBERS, radiance.shape[1], 3), np.float32)
         first = np.searchsorted(look.rows, np.arange(count + 1) * (len(share) // count))
         for row in range(count):

@@ -90,12 +90,12 @@ def _ends(scene: CachedScene, sources: Sources, points, onward, key) -> Ends:
     primitive, u, v, t = (np.concatenate([getattr(hits, name), getattr(walks, name)]) for name in ("primitive", "u", "v", "t"))
     origins, directions = np.concatenate([points, walks.points]), np.concatenate([onward, walks.directions])
     rays, rows = np.concatenate([np.arange(n), walks.rows]), np.flatnonzero(primitive >= 0)
-    fronts = context.geometry.normals_world[primitive[rows]]
-    slots = scene.cache.layout.slots(primitive[rows], u[rows], v[rows], dot(fronts, directions[rows]) < 0)
+    cosine = -dot(context.geometry.normals_world[primitive[rows]], directions[rows])
+    slots = scene.cache.layout.slots(primitive[rows], u[rows], v[rows], cosine > 0)
     # The world's bright patches are met by shadow rays, here and at every turn of a walk; all else that glows by rays alone.
     numbers = PathNumbers(key[rays], np.arange(len(rays)) // n)
     looks = Looks(origins.astype(np.float32), directions.astype(np.float32), numbers, rows,
-                  SurfaceHits(primitive[rows], u[rows], v[rows], slots), t[rows], fronts, None, np.full(len(rays), ONLY))
+                  SurfaceHits(primitive[rows], u[rows], v[rows], slots), t[rows], cosine, None, np.full(len(rays), ONLY))
     return Ends(walks.emitted + walks.gained, looks, rays, np.concatenate([left, walks.tint]))
 
 

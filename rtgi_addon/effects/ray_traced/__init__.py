@@ -6,10 +6,14 @@ mirror to mirror. Lamps stay as the frame has them, each with rays of its own. W
 Caustics, and highlights of lamps in what a mirror shows, are as the surface cache has them, spread over all directions.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...transport.context import LightContext
+from ...transport.views.camera import CameraView
+from ...transport.views.gbuffer import GBuffer
 from ..base import Effect, setting
 from ..cached import cached_scene
 from ..frame import GATHERED, Frame
@@ -18,7 +22,7 @@ from ..media.along import MediaAlong
 from ..media.lighting import Surroundings
 from .diffuse import diffuse_looks, irradiance
 from .glossy import glossy_paths, has_layer, highlights, is_smooth, mirrored
-from .lamps import MirroredLamps
+from .lamps import Mirror, MirroredLamps
 from .receivers import Pixels
 from .smoothing import smoothed
 
@@ -56,6 +60,10 @@ class RayTracedEffect(Effect):
         """See Effect.mirrors."""
         return settings.glossy_rays > 0
 
+    def lamps(self, settings: RayTracedSettings) -> Callable | None:
+        """See Effect.lamps."""
+        return _lamps if settings.glossy_rays and settings.diffuse_rays else None
+
     def gathering(self, settings: RayTracedSettings, times: float) -> RayTracedSettings:
         """See Effect.gathering."""
         rays = settings.diffuse_rays
@@ -85,7 +93,8 @@ class RayTracedEffect(Effect):
         lamps = MirroredLamps.of(context, held)
         paths = glossy_paths(scene, glossy, settings.reflections, lamps, media, threads) if settings.glossy_rays else []
         texels = scene.settle([*looks, *(end.looks for part in paths for end in part.ends)])
-        gathered, direct = frame.irradiance[seen][:, :3], frame.direct[seen][:, :3]
+        gbuffer = frame.gbuffer
+        gathered, direct = gbuffer.shown(frame.irradiance)[:, :3], gbuffer.shown(frame.direct)
         if settings.diffuse_rays:
             gathered = irradiance(scene, diffuse, looks, texels[:len(looks)], media, threads)
             if known is not None:
@@ -94,30 +103,43 @@ class RayTracedEffect(Effect):
             else:
                 gathered = _shared(diffuse, gathered, spacing) if settings.share else gathered[:, :3]
             frame.kept[GATHERED] = np.zeros_like(frame.irradiance)
-            frame.kept[GATHERED][seen, :3] = gathered
+            frame.kept[GATHERED].reshape(-1, 4)[gbuffer.rows, :3] = gathered
             if field is not None and field.includes_direct:
-                direct = direct_light(context, frame.gbuffer, frame.view, frame.turn[seen])[:, :3]
-        albedo = frame.gbuffer.albedo[seen][:, :3]
-        if settings.glossy_rays and lamps.wide:
-            direct = _less_what_rays_meet(direct, glossy, lamps, held)
-        shown = direct + frame.gbuffer.emission[seen][:, :3]
+                direct = direct_light(context, gbuffer, frame.view, gbuffer.shown(frame.turn))
+        albedo = gbuffer.shown(gbuffer.albedo)[:, :3]
+        if settings.glossy_rays and lamps.wide and not frame.bare:
+            direct = _less_what_rays_meet(direct, gbuffer, surfaces, gbuffer.shown(frame.turn), lamps, held)
+        shown = direct[:, :3] + gbuffer.shown(gbuffer.emission)[:, :3]
         if settings.glossy_rays:
             # A layer that is too faint for rays reflects as what is below it does.
             albedo = surfaces.look.diffuse + np.where(has_layer(surfaces)[:, None], np.float32(0.0), surfaces.look.layer)
             shown = shown + mirrored(scene, glossy, paths, texels[len(looks):], threads) + highlights(scene, glossy, threads)
         light = frame.light.copy()
-        light[seen, :3] = shown + albedo * gathered * np.float32(1.0 / np.pi)
+        light.reshape(-1, 4)[gbuffer.rows, :3] = shown + albedo * gathered * np.float32(1.0 / np.pi)
         return light
 
 
-def _less_what_rays_meet(direct: np.ndarray, pixels: Pixels, lamps: MirroredLamps, held: frozenset[str] | None) -> np.ndarray:
-    """The light of lamps ``direct`` (n, 3) on all ``pixels`` that are seen; where these are smooth without what their rays meet of
-    it."""
-    rows, frame = np.flatnonzero(is_smooth(pixels.surfaces.look) & has_layer(pixels.surfaces)), pixels.frame
-    surfaces, mirror, seen = pixels.surfaces.take(rows), pixels.mirror(rows), frame.gbuffer.seen
-    direct = direct.copy()
-    direct[rows] = lamps_on(lamps.context, surfaces, frame.gbuffer.instance[seen][rows], frame.turn[seen][rows], 1, held,
-                            lambda lamp, lit, towards: lamps.sampled_share(lamp, mirror.take(lit), towards))[:, :3]
+def _lamps(context: LightContext, gbuffer: GBuffer, view: CameraView, index: int | np.ndarray) -> np.ndarray:
+    """See Effect.lamps: what rays that smooth layers reflect meet of wide lamps is not in it."""
+    lamps, surfaces = MirroredLamps.of(context, frozenset()), seen_surfaces(gbuffer, view)
+    smooth = is_smooth(surfaces.look) & has_layer(surfaces)
+    if not lamps.wide or not smooth.any():
+        return direct_light(context, gbuffer, view, index)
+    instance, index = gbuffer.shown(gbuffer.instance), np.broadcast_to(index, smooth.shape)
+    direct, others = np.zeros((len(smooth), 4), np.float32), np.flatnonzero(~smooth)
+    direct[others] = lamps_on(context, surfaces.take(others), instance[others], index[others], 1, frozenset())
+    return _less_what_rays_meet(direct, gbuffer, surfaces, index, lamps, frozenset())
+
+
+def _less_what_rays_meet(direct: np.ndarray, gbuffer: GBuffer, surfaces: SeenSurfaces, index: np.ndarray, lamps: MirroredLamps,
+                         held: frozenset[str] | None) -> np.ndarray:
+    """The light of lamps ``direct`` (n, 4) on all n ``surfaces`` that are seen in samples number ``index`` (n,); where these are
+    smooth without what the rays that they reflect meet of it."""
+    rows = np.flatnonzero(is_smooth(surfaces.look) & has_layer(surfaces))
+    surfaces, direct = surfaces.take(rows), direct.copy()
+    mirror = Mirror(*surfaces, gbuffer.shown(gbuffer.primitive)[rows])
+    direct[rows] = lamps_on(lamps.context, surfaces, gbuffer.shown(gbuffer.instance)[rows], index[rows], 1, held,
+                            lambda lamp, lit, towards: lamps.sampled_share(lamp, mirror.take(lit), towards))
     return direct
 
 
@@ -133,8 +155,8 @@ def _known_light(frame: Frame, surfaces: SeenSurfaces, settings: RayTracedSettin
     None where all are to be gathered."""
     if frame.samples is None or frame.samples.light is None or not settings.diffuse_rays:
         return None, None
-    seen = frame.gbuffer.seen
-    light, found = frame.samples.light.at(frame.pixel[seen], surfaces.points, surfaces.normals, frame.footprint[seen])
+    pixel, footprint = (frame.gbuffer.shown(part) for part in (frame.pixel, frame.footprint))
+    light, found = frame.samples.light.at(pixel, surfaces.points, surfaces.normals, footprint)
     return light, np.flatnonzero(~found)
 
 
@@ -142,7 +164,7 @@ def _shared(pixels: Pixels, gathered: np.ndarray, spacing: int) -> np.ndarray:
     """Irradiance (m, 3) of all pixels that are seen, from what (n, 4) the rays of ``pixels`` gathered."""
     seen = pixels.frame.gbuffer.seen
     light, known = np.zeros((seen.size, 4), np.float32), np.zeros(seen.size, bool)
-    where = np.flatnonzero(seen)[pixels.chosen]
+    where = pixels.frame.gbuffer.rows[pixels.chosen]
     light[where], known[where] = gathered, True
     return smoothed(pixels.frame, light.reshape(*seen.shape, 4), known.reshape(seen.shape), spacing)
 

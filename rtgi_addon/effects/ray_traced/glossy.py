@@ -187,7 +187,7 @@ def at_hits(scene: CachedScene, paths: Paths, looks: Looks) -> tuple[Ends, tuple
     ended[looks.rows[goes_on]] = False
     stays = ~goes_on
     weights[looks.rows[stays]] /= (1.0 - chance[stays])[:, None]
-    mean = surfaces.albedo(*where, -dot(looks.fronts, looks.directions[looks.rows]))
+    mean = surfaces.albedo(*where, looks.cosine)
     shown = np.where((chance > 0)[:, None], look.diffuse, mean).astype(np.float32)
     ends = Ends(paths.rays[ended], looks.of(ended), weights[ended], shown[stays])
 
@@ -197,7 +197,7 @@ def at_hits(scene: CachedScene, paths: Paths, looks: Looks) -> tuple[Ends, tuple
     if looks.tint is not None:
         carried = carried * looks.tint[row]
     points = geometry.points(*(part[chosen] for part in where))
-    faces = looks.fronts[chosen] * side[chosen, None]
+    faces = geometry.normals_world[hits.primitive[chosen]] * side[chosen, None]
     mirror = Mirror(points, normals[chosen], faces, back[chosen], look.take(chosen), hits.primitive[chosen])
     return ends, (paths.rays[row], mirror, carried.astype(np.float32), looks.numbers.take(row))
 

@@ -1,6 +1,7 @@
 """Pixels as surfaces that rays leave from, chunk by chunk, all of them or a few in each sample of the picture."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -32,11 +33,10 @@ class Pixels:
     @staticmethod
     def of(frame: Frame, surfaces: SeenSurfaces, rays: int, spacing: int = 1) -> "Pixels":
         """One pixel of every ``spacing``² of all that show ``surfaces``, others in each sample of the picture."""
-        seen = frame.gbuffer.seen
         if spacing == 1:
             return Pixels(frame, surfaces, rays, np.arange(len(surfaces.points)))
-        rows, columns = np.divmod(frame.pixel[seen], frame.size[0])
-        turn = _in_turn(spacing)[frame.turn[seen] % spacing**2]
+        rows, columns = np.divmod(frame.gbuffer.shown(frame.pixel), frame.size[0])
+        turn = _in_turn(spacing)[frame.gbuffer.shown(frame.turn) % spacing**2]
         chosen = np.flatnonzero((rows % spacing == turn // spacing) & (columns % spacing == turn % spacing))
         return Pixels(frame, surfaces.take(chosen), rays, chosen)
 
@@ -55,16 +55,21 @@ class Pixels:
 
     def numbers(self, span: slice, glossy: bool = False) -> PathNumbers:
         """Numbers for the rays of ``span``: those of a pixel go on from sample to sample of the picture."""
-        ray = np.arange(span.start, span.stop)
-        frame, chosen = self.frame, self.chosen[ray // self.rays]
-        index = (frame.turn[frame.gbuffer.seen][chosen] * self.rays + ray % self.rays).astype(np.uint32)
-        where = frame.pixel[frame.gbuffer.seen][chosen]
-        return PathNumbers(hash_u32(_STREAM, _GLOSSY if glossy else _DIFFUSE, where), index)
+        first, last = span.start // self.rays, -(-span.stop // self.rays)
+        held = slice(span.start - first * self.rays, span.stop - first * self.rays)
+        key = hash_u32(_STREAM, _GLOSSY if glossy else _DIFFUSE, self._shown[0][first:last])
+        index = self._shown[1][first:last, None] * self.rays + np.arange(self.rays)
+        return PathNumbers(np.repeat(key, self.rays)[held], index.astype(np.uint32).reshape(-1)[held])
+
+    @cached_property
+    def _shown(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The number of every pixel, which of its samples this is, and the triangle that it shows (n,) each."""
+        gbuffer = self.frame.gbuffer
+        return tuple(gbuffer.shown(part)[self.chosen] for part in (self.frame.pixel, self.frame.turn, gbuffer.primitive))
 
     def receiver(self, pixel: np.ndarray) -> Receiver:
         """The surfaces of ``pixel`` (m,) as light reaches them."""
-        primitive = self.frame.gbuffer.primitive[self.frame.gbuffer.seen][self.chosen[pixel]]
-        return Receiver(self.surfaces.normals[pixel], self.surfaces.faces[pixel], primitive)
+        return Receiver(self.surfaces.normals[pixel], self.surfaces.faces[pixel], self._shown[2][pixel])
 
     def mirror(self, pixel: np.ndarray) -> Mirror:
         """The surfaces of ``pixel`` (m,) as they reflect."""

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ... import kernels
+from ...transport.lights.world_sh import unshadowed_irradiance
 from ..frame import Frame
 
 # Taps of every pass, as many pixels apart as its step.
@@ -48,18 +49,23 @@ class _Places(NamedTuple):
 def smoothed(frame: Frame, light: np.ndarray, known: np.ndarray, spacing: int) -> np.ndarray:
     """Irradiance (n, 3) [W·m⁻²] of the n pixels that show a surface, from ``light`` (h, w, 4), irradiance and the mean inverse
     distance [1/m] to what gives it, of the pixels that are ``known`` (h, w) bool, about ``spacing`` pixels apart. Where none is
-    like a pixel, the frame's own."""
+    like a pixel, the frame's own, which of a bare one is the world's with nothing in its way."""
     whole, seen, own = frame.gbuffer.seen, frame.gbuffer.seen, frame.irradiance[..., :3]
+    if frame.bare and spacing > 1:
+        own = own.copy()
+        own[seen] = unshadowed_irradiance(frame.scene.world, frame.gbuffer.normal[seen][:, :3])
     width, position, normal, pairs = frame.footprint, frame.gbuffer.position, frame.gbuffer.normal, _overlap(whole.shape)
     if frame.samples is not None:
         pairs = _listed(frame)
         light, known, seen, own, width, position, normal = (
             part[whole] for part in (light, known, seen, own, width, position, normal))
     width = np.where(seen, width, np.float32(1.0))
-    dense = None
+    inverse = (np.float32(1.0) / width).astype(np.float32)
     if frame.samples is None and kernels.is_available():
         dense = tuple(np.ascontiguousarray(part[..., :3], np.float32) for part in (position, normal))
-    places = _Places(_planes(position), _planes(normal), (np.float32(1.0) / width).astype(np.float32), seen, pairs, dense)
+        places = _Places((), (), inverse, seen, pairs, dense)
+    else:
+        places = _Places(_planes(position), _planes(normal), inverse, seen, pairs)
     steps = [*_STEPS, *(step for step in (8, 16, 32) if step < 2 * spacing)]
     weight = (known & seen).astype(np.float32)
     nearness, found = light[..., 3:], weight

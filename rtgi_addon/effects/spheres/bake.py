@@ -201,4 +201,4 @@ def _before(looks: Looks, distance: float) -> Looks:
     near = looks.t <= distance
     if near.all():
         return looks
-    return replace(looks, rows=looks.rows[near], hits=looks.hits.take(near), t=looks.t[near], fronts=looks.fronts[near])
+    return replace(looks, rows=looks.rows[near], hits=looks.hits.take(near), t=looks.t[near], cosine=looks.cosine[near])

@@ -4,6 +4,8 @@
 #include "directions.c"
 #include "gather.c"
 #include "lamps.c"
+#include "layers.c"
+#include "pixels.c"
 #include "rays.c"
 #include "ringing.c"
 #include "sampling.c"

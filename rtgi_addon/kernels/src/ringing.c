@@ -1,5 +1,4 @@
-/* Probes that ring: twins of _lowest_irradiance and _smallest_strength in techniques/lattice/reconstruction.py, in double precision,
-   for SH of bands up to 2. */
+/* Probes that ring: twin of _lowest_irradiance in techniques/lattice/reconstruction.py, in double precision, for SH of bands up to 2. */
 
 #include "rtgi.h"
 
@@ -98,58 +97,5 @@ EXPORT void KERNEL(lowest_irradiance)(int64_t p, int32_t order, int64_t c, const
     if (least < bend * (most - least)) {
       values[row] = descend(found + 3 * row, terms, order, step, refinements, ring, around);
     }
-  }
-}
-
-static int rings(const double *bands, int64_t samples, int64_t count, double strength)
-{
-  double weights[MOST_TERMS];
-  for (int64_t l = 0; l < count; l++) {
-    double product = (double)(l * (l + 1));
-    weights[l] = 1.0 / (1.0 + strength * (product * product));
-  }
-  for (int64_t i = 0; i < samples; i++) {
-    if (height(bands + i * count, weights, count) < 0.0) {
-      return 1;
-    }
-  }
-  return 0;
-}
-
-/* The smallest strength (p,) of the window under which no sample of the bands' irradiance (p, samples, count) is negative, by a ladder of
-   rungs (r,) and then bisections, or the last rung. The samples of each probe that could be negative are moved to its front. */
-EXPORT void KERNEL(window_strength)(int64_t p, int64_t samples, int64_t count, double *bands, int64_t r, const double *rungs,
-                                    int64_t bisections, double *strength)
-{
-  WITHIN(count - 1, MOST_TERMS);
-  for (int64_t probe = 0; probe < p; probe++) {
-    double *mine = bands + probe * samples * count, low = 0.0, high = INFINITY;
-    int64_t doubtful = 0;
-    for (int64_t i = 0; i < samples; i++) {
-      double *row = mine + i * count, above = 0.0;
-      for (int64_t l = 1; l < count; l++) {
-        above += fabs(row[l]);
-      }
-      if (row[0] < above * (1.0 + 1e-12)) {
-        memmove(mine + doubtful++ * count, row, (size_t)count * sizeof *row);
-      }
-    }
-    for (int64_t i = 0; i < r && isinf(high); i++) {
-      if (rings(mine, doubtful, count, rungs[i])) {
-        low = rungs[i];
-      } else {
-        high = rungs[i];
-      }
-    }
-    high = isinf(high) ? rungs[r - 1] : high;
-    for (int64_t i = 0; i < bisections; i++) {
-      double middle = 0.5 * (low + high);
-      if (rings(mine, doubtful, count, middle)) {
-        low = middle;
-      } else {
-        high = middle;
-      }
-    }
-    strength[probe] = high;
   }
 }

@@ -3,7 +3,7 @@
 #include "sampling.h"
 
 /* Dimensions first … last - 1 of points index[i] of the sequences with seed[i], for i < n: out (n, last - first). tables:
-   (dimensions, 4, 256) uint32, as _sobol_tables has them. */
+   (dimensions, 4, 256) uint32, as sobol_tables has them. */
 EXPORT void KERNEL(sobol_owen)(const uint32_t *tables, int32_t dimensions, int64_t n, const uint32_t *index, const uint32_t *seed,
                                int32_t first, int32_t last, float *out)
 {

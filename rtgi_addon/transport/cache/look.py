@@ -5,12 +5,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ... import kernels
+from ...numerics.sampling import about, cosine_hemisphere, sobol_tables
 from ...progress import Progress
 from ..context import LightContext
 from ..lights.links import LightLinks
 from ..paths.direct import Receiver, sample_environment
-from ..paths.numbers import PathNumbers
-from ..rays.tracer import offset_origins
+from ..paths.numbers import SCATTER, PathNumbers
+from ..rays.ray_counter import record
+from ..rays.tracer import Tracer, offset_origins
 from ..vectors import dot
 from .hit_light import HitLight, HitRays
 from .relighting import light_again
@@ -32,9 +35,9 @@ _COSINE_DENSITY = 1.0 / np.pi
 @dataclass(frozen=True, eq=False)
 class Looks:
     """Rays from ``origins`` (n, 3) along unit ``directions`` (n, 3), with ``numbers`` for them, and what they met: ``rows`` (h,) of
-    those that ``hits`` (h,) surfaces, ``t`` (h,) [m] away, ``fronts`` (h, 3) the normals there, ``tint`` (n, 3) of what comes along
-    (None: unchanged). ``density`` (n,) [1/sr] is what they were drawn with, None where no other samples compete with them;
-    ``depth`` how many surfaces the paths had met before."""
+    those that ``hits`` (h,) surfaces, ``t`` (h,) [m] away, under ``cosine`` (h,) between the front's normal there and the way back,
+    ``tint`` (n, 3) of what comes along (None: unchanged). ``density`` (n,) [1/sr] is what they were drawn with, None where no other
+    samples compete with them; ``depth`` how many surfaces the paths had met before."""
 
     origins: np.ndarray
     directions: np.ndarray
@@ -42,7 +45,7 @@ class Looks:
     rows: np.ndarray
     hits: SurfaceHits
     t: np.ndarray
-    fronts: np.ndarray
+    cosine: np.ndarray
     tint: np.ndarray | None
     density: np.ndarray | None
     depth: int = 0
@@ -52,7 +55,7 @@ class Looks:
         position, kept = np.cumsum(chosen) - 1, chosen[self.rows]
         optional = (None if part is None else part[chosen] for part in (self.tint, self.density))
         return Looks(self.origins[chosen], self.directions[chosen], self.numbers.take(chosen), position[self.rows[kept]],
-                     self.hits.take(kept), self.t[kept], self.fronts[kept], *optional, self.depth)
+                     self.hits.take(kept), self.t[kept], self.cosine[kept], *optional, self.depth)
 
 
 class CachedScene:
@@ -66,6 +69,7 @@ class CachedScene:
     def __init__(self, context: LightContext, cache: SurfaceCache):
         self.context, self.cache = context, cache
         self._hit_light = HitLight(cache)
+        self._albedo = context.surfaces.albedo_by_triangle()
         # Where everything glows, samples of it add nothing but noise.
         self._samples_emitters = cache.emitter_samples > 0
 
@@ -90,10 +94,40 @@ class CachedScene:
         hits = self.context.tracers.diffuse.intersect(origins, directions)
         rows = np.flatnonzero(hits.primitive >= 0)
         primitive, u, v = hits.primitive[rows], hits.u[rows], hits.v[rows]
-        fronts = self.context.geometry.normals_world[primitive]
-        slots = self.cache.layout.slots(primitive, u, v, dot(fronts, directions[rows]) < 0)
-        return Looks(origins, directions, numbers, rows, SurfaceHits(primitive, u, v, slots), hits.t[rows], fronts, hits.tint,
+        cosine = -dot(self.context.geometry.normals_world[primitive], directions[rows])
+        slots = self.cache.layout.slots(primitive, u, v, cosine > 0)
+        return Looks(origins, directions, numbers, rows, SurfaceHits(primitive, u, v, slots), hits.t[rows], cosine, hits.tint,
                      density, depth)
+
+    def look_about(self, points: np.ndarray, normals: np.ndarray, faces: np.ndarray, numbers: PathNumbers, rays: int) -> Looks:
+        """Trace ``rays`` cosine-distributed rays each from ``points`` on surfaces with unit shading ``normals`` and triangles'
+        normals ``faces`` (n, 3), one after the other, by ``numbers`` for each ray; see Looks."""
+        tracer = self.context.tracers.diffuse
+        if kernels.is_available() and getattr(tracer, "kernel", None) is not None:
+            return self._look_about(tracer, points, normals, faces, numbers, rays)
+        local, point = cosine_hemisphere(numbers.draw(0, SCATTER, 2)), np.repeat(np.arange(len(points)), rays)
+        directions = about(normals[point], local)
+        density = local[:, 2] * np.float32(_COSINE_DENSITY)
+        return self.look(offset_origins(points[point], faces[point], directions), directions, numbers, density)
+
+    def _look_about(self, tracer: Tracer, points, normals, faces, numbers: PathNumbers, rays: int) -> Looks:
+        """See look_about: in one pass, where no surface lets rays through."""
+        n = len(points) * rays
+        record(n)
+        starts = [np.ascontiguousarray(part, np.float32) for part in (points, normals, faces)]
+        if any(part.shape != (len(points), 3) for part in starts):
+            raise ValueError(f"{[part.shape for part in starts]} where {len(points)} points are expected")
+        origins, directions = np.empty((2, n, 3), np.float32)
+        rows, primitive, slots = np.empty((3, n), np.int32)
+        leaving, u, v, t, cosine = np.empty((5, n), np.float32)
+        cells = self.cache.layout.cells  # held while the kernel reads it
+        count = kernels.call("cosine_rays", tracer.kernel, len(cells), cells.ctypes.data, sobol_tables(), SCATTER, len(points),
+                             rays, *numbers.dense(n), *starts, origins, directions, leaving, rows,
+                             primitive, u, v, t, slots, cosine)
+        # Copies: what is held until all is shaded is most of a sample's memory.
+        rows, primitive, slots, u, v, t, cosine = (part[:count].copy() for part in (rows, primitive, slots, u, v, t, cosine))
+        return Looks(origins, directions, numbers, rows.astype(np.int64), SurfaceHits(primitive, u, v, slots), t, cosine, None,
+                     leaving * np.float32(_COSINE_DENSITY))
 
     def settle(self, looks: list[Looks], progress: Progress | None = None) -> list[np.ndarray]:
         """The texel (h,) of every hit of each of ``looks``, with the light on all of them known. Raises BakeError where there is
@@ -112,7 +146,9 @@ class CachedScene:
         surfaces, environment, rays = self.context.surfaces, self.context.environment, _LookRays(look)
         every, hits = np.arange(len(look.rows)), look.hits
         result = np.zeros(look.directions.shape, np.float32)
-        if albedo is None:
+        if albedo is None and self._albedo is not None and len(self._albedo) != len(texel):
+            albedo = self._albedo
+        elif albedo is None:
             albedo = surfaces.albedo(hits.primitive, hits.u, hits.v, rays.cosine(every))
         seen = self._hit_light.reflected(hits, texel, albedo, rays)
         if surfaces.has_emission:
@@ -145,6 +181,13 @@ class CachedScene:
         off = offset_origins(points, receiver.face, receiver.face)
         return sample_environment(self.context, off, numbers, 0, per_ray, receiver, self._samples_emitters)
 
+    @property
+    def has_samples(self) -> bool:
+        """Whether there is anything that ``sampled_irradiance`` finds."""
+        context = self.context
+        emitters = self._samples_emitters and context.emitters.count > 0
+        return bool(emitters or context.environment.bright.count or self.cache.bright.count)
+
     def sampled_irradiance(self, points: np.ndarray, receiver: Receiver, numbers: PathNumbers) -> np.ndarray:
         """An estimate (n, 3) [W·m⁻²] of what emissive and brightly lit surfaces and bright patches of the world give ``points``
         (n, 3) on surfaces: one sample each, weighted against one ray of density cosθ/π."""
@@ -170,7 +213,7 @@ class _LookRays(HitRays):
 
     def take(self, rows: np.ndarray) -> "_LookRays":
         look = self.looks
-        return _LookRays(replace(look, rows=look.rows[rows], hits=look.hits.take(rows), t=look.t[rows], fronts=look.fronts[rows]))
+        return _LookRays(replace(look, rows=look.rows[rows], hits=look.hits.take(rows), t=look.t[rows], cosine=look.cosine[rows]))
 
     def points(self, rows: np.ndarray) -> np.ndarray:
         ray = self.looks.rows[rows]
@@ -180,7 +223,7 @@ class _LookRays(HitRays):
         return self.looks.t[rows]
 
     def cosine(self, rows: np.ndarray) -> np.ndarray:
-        return -dot(self.looks.fronts[rows], self.looks.directions[self.looks.rows[rows]])
+        return self.looks.cosine[rows]
 
     def numbers(self, rows: np.ndarray, count: int) -> np.ndarray:
         return self.looks.numbers.take(self.looks.rows[rows]).draw(self.looks.depth, _AT_HIT, count)

@@ -26,6 +26,11 @@ class PathNumbers:
         """(n,) uint32: a key of each path at a depth, for what takes any number of numbers."""
         return hash_u32(self._key, self._index, depth, _HASHES)
 
+    def dense(self, n: int) -> tuple[np.ndarray, np.ndarray]:
+        """Keys and places (n,) uint32 each, as kernels take them."""
+        return tuple(np.ascontiguousarray(np.broadcast_to(part, (n,)).astype(np.uint32, copy=False))
+                     for part in (self._key, self._index))
+
     @staticmethod
     def join(parts: "list[PathNumbers]") -> "PathNumbers":
         """The numbers of several sets of paths, one after the other."""

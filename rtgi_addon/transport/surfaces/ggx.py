@@ -35,9 +35,26 @@ def energy_table() -> np.ndarray:
     """(SIZE · INDICES, SIZE, 4) float32: blocks of SIZE rows, a row a roughness, a column a cosine of the view, both from 0 to 1 at
     texel centres. The first block has a and b, and their means over a uniform sky; block 1 + i what of the way from the reflectance
     at normal incidence to 1 a dielectric reflects on the average, of index i and of i + 1, and their means."""
+    parts, cosine = _layer_parts(), (np.arange(SIZE) + 0.5) / SIZE
+    means = [np.repeat(np.sum(part * (2.0 * cosine / SIZE), axis=1, keepdims=True), SIZE, axis=1) for part in parts]
+    pairs = [(0, 1), *((2 + index, 3 + index) for index in range(INDICES - 1))]
+    blocks = [np.stack([parts[i], parts[j], means[i], means[j]], axis=-1) for i, j in pairs]
+    return np.concatenate(blocks).astype(np.float32)
+
+
+def _layer_parts() -> list[np.ndarray]:
+    """The parts (SIZE, SIZE) that the energy table is made of: a, b, and each index's way."""
     cosine = ((np.arange(SIZE) + 0.5) / SIZE)[None, :, None]
     alpha = np.maximum(((np.arange(SIZE) + 0.5) / SIZE) ** 2, MIN_ALPHA)[:, None, None]
     u = sobol_owen(_SAMPLES, 2, 0).astype(np.float64)
+    at_normal = np.clip(np.linspace(0.0, 1.0, INDICES), 1e-2, _MOST_ROOT) ** 4
+    dielectrics = [(f0, index_of(f0)) for f0 in at_normal.astype(np.float32)]
+    if kernels.is_available():
+        radius, angle = np.sqrt(u[:, 0]), 2.0 * np.pi * u[:, 1]
+        disk = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+        parts = np.empty((2 + INDICES, SIZE, SIZE))
+        kernels.call("layer_parts", SIZE, _SAMPLES, np.ravel(alpha), disk, INDICES, np.array(dielectrics, np.float32), parts)
+        return list(parts)
     view = np.stack(np.broadcast_arrays(np.sqrt(1.0 - cosine**2), 0.0, cosine), axis=-1)
     half = _visible_normal(view, alpha, u)
     along = np.sum(view * half, axis=-1)
@@ -49,14 +66,10 @@ def energy_table() -> np.ndarray:
     grazing = np.clip(1.0 - along, 0.0, 1.0) ** 5
     parts = [np.mean(share * (1.0 - grazing), axis=-1), np.mean(share * grazing, axis=-1)]
     share, along = share.astype(np.float32), np.clip(along, 0.0, 1.0).astype(np.float32)
-    for root in np.linspace(0.0, 1.0, INDICES):
-        f0 = np.float32(min(max(root, 1e-2), _MOST_ROOT) ** 4)
-        way = (dielectric_fresnel(along, index_of(f0)) - f0) / (1.0 - f0)
+    for f0, index in dielectrics:
+        way = (dielectric_fresnel(along, index) - f0) / (1.0 - f0)
         parts.append(np.mean(share * way, axis=-1, dtype=np.float64))
-    means = [np.repeat(np.sum(part * (2.0 * cosine[0, :, 0] / SIZE), axis=1, keepdims=True), SIZE, axis=1) for part in parts]
-    pairs = [(0, 1), *((2 + index, 3 + index) for index in range(INDICES - 1))]
-    blocks = [np.stack([parts[i], parts[j], means[i], means[j]], axis=-1) for i, j in pairs]
-    return np.concatenate(blocks).astype(np.float32)
+    return parts
 
 
 def index_of(f0: np.ndarray) -> np.ndarray:

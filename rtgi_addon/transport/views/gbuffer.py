@@ -55,6 +55,15 @@ class GBuffer:
         return (self.normal[..., 0] != 0) | (self.normal[..., 1] != 0) | (self.normal[..., 2] != 0)
 
     @cached_property
+    def rows(self) -> np.ndarray:
+        """(n,) where there is a surface, in the picture as one row."""
+        return np.flatnonzero(self.seen)
+
+    def shown(self, target: np.ndarray) -> np.ndarray:
+        """What ``target`` (h, w, ...), of this or of anything about the same picture, has where there is a surface: (n, ...)."""
+        return np.take(target.reshape(-1, *target.shape[2:]), self.rows, axis=0)
+
+    @cached_property
     def primitive(self) -> np.ndarray:
         """(h, w) int32: triangles as transport.surfaces.geometry.Geometry numbers them, −1 where nothing is seen."""
         return decode_primitive(self.position, self.normal)
