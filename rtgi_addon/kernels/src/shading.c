@@ -171,21 +171,50 @@ EXPORT void KERNEL(kept_light)(int64_t m, const float *kept_points, const uint16
   }
 }
 
-/* How much light counts that comes to pixel here from there, without what distances say of it. */
-static inline float alike(const float *points, const float *normals, const float *inverse, const float *reach, int64_t here,
-                          int64_t there)
+enum { TOGETHER_SHARED = 128, WAYS = 4 };
+
+/* How much (count,) light counts that comes to count pixels from here on from as many from there on, in one picture. */
+static void alike(const float *points, const float *normals, const float *inverse, const float *reach, int64_t here, int64_t there,
+                  int64_t count, float *counts)
 {
-  Vec apart = sub(load(points, there), load(points, here)), normal = load(normals, here);
-  float counts = likeness(dot(normal, load(normals, there))), off = dot(normal, apart) * inverse[here];
-  if (counts <= 0.0f) {
-    return 0.0f;
+  const float *p = points + 3 * here, *q = points + 3 * there, *n = normals + 3 * here, *m = normals + 3 * there;
+  for (int64_t i = 0; i < count; i++) {
+    float x = q[3 * i] - p[3 * i], y = q[3 * i + 1] - p[3 * i + 1], z = q[3 * i + 2] - p[3 * i + 2];
+    float like = likeness(n[3 * i] * m[3 * i] + n[3 * i + 1] * m[3 * i + 1] + n[3 * i + 2] * m[3 * i + 2]);
+    float off = (n[3 * i] * x + n[3 * i + 1] * y + n[3 * i + 2] * z) * inverse[here + i], exponent = -4.0f * off * off;
+    if (reach) {
+      float near = smallest(reach[here + i], reach[there + i]);
+      exponent -= (x * x + y * y + z * z) / largest(near * near, 1e-20f);
+    }
+    counts[i] = exponent > -64.0f ? like * power_of_two(largest(exponent, -64.0f)) : 0.0f;
   }
-  float exponent = -4.0f * off * off;
-  if (reach) {
-    float near = smallest(reach[here], reach[there]);
-    exponent -= dot(apart, apart) / largest(near * near, 1e-20f);
+}
+
+/* What is shared at pixel here, by counts of its taps, which lie apart from it: see share_light. */
+static inline void shared_at(int64_t here, int64_t channels, const float *values, const float *weight, const float *by,
+                             const int64_t *apart, int64_t pixels, float *mean, float *counted)
+{
+  float total[4] = {0, 0, 0, 0}, sum = weight[here] * 0.25f, most = 0.25f;
+  for (int64_t k = 0; k < channels; k++) {
+    total[k] = values[channels * here + k] * sum;
   }
-  return exponent > -64.0f ? counts * power_of_two(exponent) : 0.0f;
+  for (int tap = 0; tap < 2 * WAYS; tap++) {
+    /* What is beyond the picture counts by nothing, and is not read. */
+    if (by[tap] > 0.0f) {
+      int64_t there = here + apart[tap];
+      WITHIN(there, pixels);
+      float share = by[tap] * weight[there];
+      most += by[tap];
+      for (int64_t k = 0; k < channels; k++) {
+        total[k] += values[channels * there + k] * share;
+      }
+      sum += share;
+    }
+  }
+  for (int64_t k = 0; k < channels; k++) {
+    mean[channels * here + k] = total[k] / largest(sum, 1e-20f);
+  }
+  counted[here] = sum / most;
 }
 
 /* One pass over a picture of height x width pixels: values (h, w, channels) that count by weight (h, w), averaged over taps step
@@ -195,40 +224,38 @@ EXPORT void KERNEL(share_light)(int64_t height, int64_t width, int64_t step, con
                                 const float *inverse, const float *reach, const uint8_t *seen, int64_t channels,
                                 const float *values, const float *weight, float alone, float *mean, float *counted)
 {
-  static const int ways[4][2] = {{0, 1}, {1, -1}, {1, 0}, {1, 1}};
+  static const int ways[WAYS][2] = {{0, 1}, {1, -1}, {1, 0}, {1, 1}};
+  static const float shares[WAYS] = {0.125f, 0.0625f, 0.125f, 0.0625f};
+  float counts[2 * WAYS][TOGETHER_SHARED];
+  int64_t apart[2 * WAYS];
   for (int64_t row = 0; row < height; row++) {
-    for (int64_t column = 0; column < width; column++) {
-      int64_t here = row * width + column;
-      float total[4] = {0, 0, 0, 0}, sum = weight[here] * 0.25f, most = 0.25f;
-      for (int64_t k = 0; k < channels; k++) {
-        total[k] = values[channels * here + k] * sum;
-      }
-      for (int way = 0; seen[here] && way < 4; way++) {
-        int64_t there[2];
-        float counts[2];
-        for (int side = 0; side < 2; side++) {
-          int64_t sign = side ? -step : step, down = row + sign * ways[way][0], along = column + sign * ways[way][1];
-          there[side] = down >= 0 && down < height && along >= 0 && along < width ? down * width + along : -1;
-          counts[side] = there[side] < 0 ? 0.0f : alike(points, normals, inverse, reach, here, there[side]);
-        }
-        float both = smallest(counts[0], counts[1]), share = ways[way][0] && ways[way][1] ? 0.0625f : 0.125f;
-        for (int side = 0; side < 2; side++) {
-          if (there[side] < 0) {
-            continue;
-          }
-          float by = (both + alone * counts[side]) * share;
-          most += by;
-          by *= weight[there[side]];
-          for (int64_t k = 0; k < channels; k++) {
-            total[k] += values[channels * there[side] + k] * by;
-          }
-          sum += by;
+    for (int64_t start = 0; start < width; start += TOGETHER_SHARED) {
+      int64_t end = start + TOGETHER_SHARED < width ? start + TOGETHER_SHARED : width;
+      memset(counts, 0, sizeof counts);
+      for (int tap = 0; tap < 2 * WAYS; tap++) {
+        int64_t sign = tap & 1 ? -step : step, down = sign * ways[tap / 2][0], along = sign * ways[tap / 2][1];
+        int64_t first = start + along < 0 ? -along : start, last = end + along > width ? width - along : end;
+        apart[tap] = down * width + along;
+        if (row + down >= 0 && row + down < height && first < last) {
+          alike(points, normals, inverse, reach, row * width + first, row * width + first + apart[tap], last - first,
+                counts[tap] + (first - start));
         }
       }
-      for (int64_t k = 0; k < channels; k++) {
-        mean[channels * here + k] = total[k] / largest(sum, 1e-20f);
+      for (int64_t column = start; column < end; column++) {
+        int64_t here = row * width + column, at = column - start;
+        float by[2 * WAYS];
+        for (int tap = 0; tap < 2 * WAYS; tap++) {
+          float both = smallest(counts[tap & ~1][at], counts[tap | 1][at]);
+          by[tap] = seen[here] ? (both + alone * counts[tap][at]) * shares[tap / 2] : 0.0f;
+        }
+        /* Numbers of channels that are known make other loops. */
+        if (channels == 3) {
+          shared_at(here, 3, values, weight, by, apart, height * width, mean, counted);
+        } else {
+          shared_at(here, channels, values, weight, by, apart, height * width, mean, counted);
+        }
+        counted[here] = seen[here] ? counted[here] : 0.0f;
       }
-      counted[here] = seen[here] ? sum / most : 0.0f;
     }
   }
 }
