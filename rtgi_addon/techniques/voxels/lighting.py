@@ -26,6 +26,7 @@ from ...transport.voxels.between import Between, between
 from ...transport.voxels.grid import FACES
 from ...transport.voxels.injection import inject
 from ...transport.voxels.sweeps import irradiance_of_cells, sweep
+from ...transport.voxels.unseen import shown_alone, within_solids
 from ..lpv.sources import map_views
 from .settings import MAPS, VoxelSettings
 
@@ -64,6 +65,11 @@ class VoxelLight:
         """What stands between the middles of the voxels."""
         return between(self._voxels, self._context.geometry)
 
+    @cached_property
+    def _hidden(self) -> np.ndarray:
+        """(e,) bool: what is within solids."""
+        return within_solids(self._context, self._voxels)
+
     @property
     def grid(self) -> VoxelGrid:
         """Of the voxels."""
@@ -72,7 +78,7 @@ class VoxelLight:
     def direct(self, progress: Progress) -> np.ndarray:
         """Radiance (e, 3) that leaves of the light of lamps, bright sky and what is emitted. Raises Cancelled, BakeError."""
         direct = self._by_chunks(self._direct, progress, "lamps on voxels")
-        return direct + self._mapped(progress) if self._settings.light == MAPS else direct
+        return self._shown(direct + self._mapped(progress) if self._settings.light == MAPS else direct)
 
     def swept(self, last: np.ndarray, beyond, progress: Progress, around: np.ndarray | None = None) -> np.ndarray:
         """What arrives in the cells (nz, ny, nx, 9, 3) of what leaves what they show, ``last`` (e, 3), and of what lies beyond the
@@ -82,8 +88,8 @@ class VoxelLight:
 
     def reflected(self, part: "VoxelLight", light: np.ndarray) -> np.ndarray:
         """What leaves (e, 3) of the ``light`` (nz, ny, nx, 9, 3) that arrives in the cells of ``part``."""
-        return self._by_chunks(lambda rows: self._leaving(rows, lambda surface, _turn: _received(part, light, surface)),
-                               Progress(), "")
+        return self._shown(self._by_chunks(
+            lambda rows: self._leaving(rows, lambda surface, _turn: _received(part, light, surface)), Progress(), ""))
 
     def kept(self, before: np.ndarray, light: np.ndarray, after: np.ndarray) -> np.ndarray:
         """See kept_share: of what leaves ``before`` and ``after`` (e, 3) ``light`` (nz, ny, nx, 9, 3) has arrived."""
@@ -103,6 +109,10 @@ class VoxelLight:
         spans = chunks(len(self._voxels.seen.face), CHUNK)
         parts = parallel_for(lambda i: work(spans[i]), len(spans), self._context.threads, progress, label)
         return np.concatenate(parts) if parts else np.zeros((0, 3), np.float32)
+
+    def _shown(self, light: np.ndarray) -> np.ndarray:
+        """``light`` (e, 3) without what is within solids."""
+        return shown_alone(self._voxels, self._hidden, light) if self._hidden.any() else light
 
     def _surface(self, rows: slice, turn: float = 1.0) -> SurfacePoints:
         """The points that are seen, with normals to the side that is (``turn`` -1: to the other)."""
@@ -171,8 +181,9 @@ class VoxelLight:
         other = SurfaceHits(seen.primitive, seen.u, seen.v, slots ^ 1)
         texel, behind = cache.reach([hits, other if context.surfaces.has_translucency else other.take(slice(0, 0))], progress)
         cache.solve(None, TOLERANCE, progress)
-        return self._by_chunks(lambda rows: self._leaving(
-            rows, lambda _surface, turn: cache.irradiance_rest[(texel if turn > 0 else behind)[rows]]), progress, "light on voxels")
+        return self._shown(self._by_chunks(
+            lambda rows: self._leaving(rows, lambda _surface, turn: cache.irradiance_rest[(texel if turn > 0 else behind)[rows]]),
+            progress, "light on voxels"))
 
 
 def _received(part: VoxelLight, light: np.ndarray, surface: SurfacePoints) -> np.ndarray:

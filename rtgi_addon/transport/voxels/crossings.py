@@ -32,6 +32,10 @@ class Crossings:
     u: np.ndarray
     v: np.ndarray
 
+    def take(self, rows: np.ndarray) -> "Crossings":
+        """Those of ``rows``."""
+        return Crossings(self.axis, *(getattr(self, name)[rows] for name in ("cell", "line", "depth", "primitive", "u", "v")))
+
     @property
     def within(self) -> np.ndarray:
         """Where in their cells the crossings are along the axis (n,), in cells from the centres."""

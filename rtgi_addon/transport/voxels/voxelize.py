@@ -22,12 +22,15 @@ from ..surfaces.geometry import Geometry
 from ..surfaces.materials import Surfaces
 from .crossings import TIE, Crossings, crossings, extremes
 from .grid import FACES, VoxelGrid
+from .pieces import Pieces, cut, find_sparse, undivided
 from .walls import Walls, find_walls
 
 # Lines along each side of a column of cells.
 LINES = 4
 # Of the lines of a face so many carry its light, spread as rooks on a chess board: one of each row and column.
 ROOKS = {1: (0,), 2: (0, 1), 3: (1, 2, 0), 4: (1, 3, 0, 2)}
+# Where no more than this share of the lines along any axis meet something, what there is is cut out.
+FEW = 0.25
 # How far, RMS in cells, the places where lines meet a cell's surfaces may lie about a plane across them; where there is none.
 _LEVEL, NO_PLATE = 0.003, np.float32(9.0)
 # Coverage from which on a surface lets nothing through.
@@ -112,19 +115,28 @@ def voxelize(geometry: Geometry, surfaces: Surfaces, grid: VoxelGrid, threads: i
         parts = parallel_for(lambda axis: crossings(grid, corners, chosen, axis, lines), 3, threads)
     else:
         parts = [meet(grid, corners, chosen, axis, lines) for axis in range(3)]
-    area = _areas(geometry, chosen[~whole[chosen]], parts, grid, lines)
-    lone, place = _lone(grid, corners, chosen, parts)
+    touching = find_sparse(grid, corners, *_met_by(parts, grid, lines), 1.0 / lines)
+    parts = [part.take(np.flatnonzero(~touching.sparse[part.cell])) for part in parts]
+    count = sum(np.bincount(part.primitive, minlength=geometry.count) for part in parts)
+    pieces = cut(grid, corners, chosen, touching, count[chosen] > 0)
+    share = np.bincount(pieces.primitive, pieces.share, geometry.count)
+    lone = np.flatnonzero((count[chosen] == 0) & (share[chosen] == 0))
+    area = _areas(geometry, 1.0 - share, count, chosen[~whole[chosen]], grid, lines)
+    pieces = pieces.and_also(undivided(grid, corners[:, :, lone], chosen[lone]))
     held = np.zeros(grid.count, bool)
-    for cell in (*(part.cell for part in parts), place):
-        held[cell] = True
+    for part in (*parts, pieces):
+        held[part.cell] = True
     cells = np.flatnonzero(held)
     row = np.zeros(grid.count, np.int32)
     row[cells] = np.arange(len(cells), dtype=np.int32)
     axes = parallel_for(lambda axis: _along(parts[axis], geometry, surfaces, row, len(cells), lines), 3, threads)
-    opacity = np.stack([opacity for opacity, _ in axes], axis=1)
+    few, seen_few = _by_pieces(pieces.take(np.flatnonzero(touching.sparse[pieces.cell])), geometry, surfaces, grid, row, len(cells))
+    opacity = np.stack([opacity for opacity, _ in axes], axis=1) + few
     plates = np.stack([_plates(part, row, len(cells)) for part in parts], axis=1)
-    seen = Seen(*(np.concatenate([getattr(seen, name) for _, seen in axes]) for name in Seen.__dataclass_fields__))
-    sums = _sums(geometry, surfaces, parts, (lone, place), area, row, len(cells), lines)
+    found = [*(seen for _, seen in axes), seen_few]
+    seen = Seen(*(np.concatenate([getattr(part, name) for part in found]) for name in Seen.__dataclass_fields__))
+    shares = [*((part, area[part.primitive]) for part in parts), (pieces, pieces.share * geometry.areas[pieces.primitive])]
+    sums = _sums(geometry, surfaces, shares, row, len(cells), lines)
     covered = np.maximum(sums[:, 1:2], np.finfo(np.float64).tiny)
     means = (sums[:, columns] / covered for columns in (slice(2, 5), slice(5, 8), slice(8, 14), slice(14, 17)))
     return Voxels(grid, cells, opacity, sums[:, 0], *means, sums[:, 17] == 0, plates, seen)
@@ -143,27 +155,28 @@ def _met(geometry: Geometry, grid: VoxelGrid, low: np.ndarray, high: np.ndarray)
     return geometry.visibility.diffuse[geometry.instance] & ((high >= -TIE) & (low <= size)).all(axis=0)
 
 
-def _areas(geometry: Geometry, cut, parts: list[Crossings], grid: VoxelGrid, lines: int) -> np.ndarray:
-    """Area (t,) float64 [m²] that one crossing of each triangle stands for: an equal share of it, and of those that are ``cut``
-    (c,) by the grid's border what the density of lines says."""
-    met = sum(np.bincount(part.primitive, minlength=geometry.count) for part in parts)
-    area = geometry.areas.astype(np.float64) / np.maximum(met, 1)
-    if cut.size:
-        density = np.abs(geometry.normals_world[cut].astype(np.float64)).sum(axis=1) * (lines / grid.cell) ** 2
-        area[cut] = 1.0 / np.maximum(density, np.finfo(np.float64).tiny)
-    return area
-
-
-def _lone(grid: VoxelGrid, corners, chosen, parts: list[Crossings]) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles that no line met, and the cells (n,) of their middles: they are small, and all of each is there."""
-    met = np.zeros(int(chosen.max()) + 1, bool)
+def _met_by(parts: list[Crossings], grid: VoxelGrid, lines: int) -> tuple[np.ndarray, np.ndarray]:
+    """(nz·ny·nx,) bool twice: cells in which lines meet anything, and those of them where that is no more than FEW of those along
+    each axis."""
+    most = np.zeros(grid.count, np.uint16)
     for part in parts:
-        met[part.primitive] = True
-    rows = np.flatnonzero(~met[chosen])
-    column = np.floor(corners[:, :, rows].mean(axis=1) + TIE).astype(np.int64)
-    inside = ((column >= 0) & (column < np.reshape(grid.resolution, (3, 1)))).all(axis=0)
-    x, y, z = column[:, inside]
-    return chosen[rows[inside]], (z * grid.resolution[1] + y) * grid.resolution[0] + x
+        cells = np.flatnonzero(np.bincount(part.cell, minlength=grid.count))
+        row = np.zeros(grid.count, np.int32)
+        row[cells] = np.arange(len(cells), dtype=np.int32)
+        met = np.zeros(len(cells) * lines**2, bool)
+        met[row[part.cell].astype(np.int64) * lines**2 + part.line] = True
+        most[cells] = np.maximum(most[cells], met.reshape(-1, lines**2).sum(axis=1, dtype=np.uint16))
+    return most > 0, (most > 0) & (most <= FEW * lines**2)
+
+
+def _areas(geometry: Geometry, left: np.ndarray, count: np.ndarray, border, grid: VoxelGrid, lines: int) -> np.ndarray:
+    """Area (t,) float64 [m²] that one of the ``count`` (t,) crossings of each triangle stands for: an equal part of the share
+    ``left`` (t,) of it, and of those at the grid's ``border`` (c,) what the density of lines says."""
+    area = geometry.areas * left / np.maximum(count, 1)
+    if border.size:
+        density = np.abs(geometry.normals_world[border].astype(np.float64)).sum(axis=1) * (lines / grid.cell) ** 2
+        area[border] = 1.0 / np.maximum(density, np.finfo(np.float64).tiny)
+    return area
 
 
 def _coverage(surfaces: Surfaces, part) -> np.ndarray | None:
@@ -200,6 +213,32 @@ def _along(part: Crossings, geometry: Geometry, surfaces: Surfaces, row, cells: 
         carried = np.bincount(face[rows], weight[rows], FACES * cells)
         scaled = weight[rows] * (shown / np.maximum(carried, 1e-30))[face[rows]]
         faces.append(Seen(face[rows], scaled.astype(np.float32), part.primitive[rows], part.u[rows], part.v[rows], side[rows]))
+    return opacity, Seen(*(np.concatenate([getattr(seen, name) for seen in faces]) for name in Seen.__dataclass_fields__))
+
+
+def _by_pieces(pieces: Pieces, geometry: Geometry, surfaces: Surfaces, grid: VoxelGrid, row, cells: int) -> tuple[np.ndarray, Seen]:
+    """Opacity (m, 3) float32 of cells that lines hardly meet, and what their faces show: what looks one way along an axis lies side
+    by side, in front of what looks the other way."""
+    cell, coverage = row[pieces.cell], _coverage(surfaces, pieces)
+    area = pieces.share * geometry.areas[pieces.primitive] / grid.cell**2
+    area = area if coverage is None else area * coverage
+    opacity, faces = np.zeros((cells, 3), np.float32), []
+    for axis in range(3):
+        across = area * geometry.normals_world[pieces.primitive, axis]
+        fronts = [np.bincount(cell, np.maximum(turn * across, 0), cells) for turn in (-1, 1)]
+        most = np.minimum(np.maximum(*fronts), 1.0)
+        opacity[:, axis] = most
+        for end, turn in enumerate((-1, 1)):
+            # Of fronts as much as there is room for, and of backs what they leave.
+            of_front, of_back = np.minimum(fronts[end], most), np.maximum(most - fronts[end], 0.0)
+            scale = [part / np.maximum(whole, 1e-30) for part, whole in zip((of_front, of_back), (fronts[end], fronts[1 - end]),
+                                                                          strict=True)]
+            front = turn * across > 0
+            weight = np.abs(across) * np.where(front, scale[0][cell], scale[1][cell])
+            rows = np.flatnonzero(weight > 0)
+            faces.append(Seen(cell[rows].astype(np.int64) * FACES + 2 * axis + end, weight[rows].astype(np.float32),
+                              pieces.primitive[rows], pieces.u[rows], pieces.v[rows],
+                              np.where(front[rows], np.float32(1), np.float32(-1))))
     return opacity, Seen(*(np.concatenate([getattr(seen, name) for seen in faces]) for name in Seen.__dataclass_fields__))
 
 
@@ -242,22 +281,17 @@ def _chosen(face, weight, light, faces: int) -> np.ndarray:
     return np.flatnonzero(visible & (light | ~carried[face]))
 
 
-def _sums(geometry: Geometry, surfaces: Surfaces, parts: list[Crossings], lone, area, row, cells: int, lines: int) -> np.ndarray:
-    """(m, 15) float64: area, covered area A·α, A·α·n, A·α·albedo, A·α of products of n (Voxels.lie), and how much is not
-    covered."""
-    primitive, place = lone
-    middle = np.full(len(place), 1.0 / 3.0, np.float32)
-    # What no line met counts where the cell's middle is.
-    center = np.full(len(place), lines // 2 * lines + lines // 2, np.int32)
-    alone = Crossings(0, place, center, np.full(len(place), 0.5, np.float32), primitive, middle, middle)
+def _sums(geometry: Geometry, surfaces: Surfaces, parts, row, cells: int, lines: int) -> np.ndarray:
+    """(m, 18) float64: area, covered area A·α, A·α·n, A·α·albedo, A·α of products of n (Voxels.lie) and of where it lies, and how
+    much is not covered. ``parts`` are crossings or pieces, each with the area (n,) that they stand for."""
     table, total = surfaces.albedo_by_triangle(), np.zeros((cells, 18))
-    for part in (*parts, alone):
-        index, primitive, share = row[part.cell], part.primitive, area[part.primitive]
+    for part, share in parts:
+        index, primitive = row[part.cell], part.primitive
         coverage = _coverage(surfaces, part)
         covered = share if coverage is None else share * coverage
         for axis, place in enumerate(part.places(lines)):
             total[:, 14 + axis] += np.bincount(index, covered * place, cells)
-        if table is not None and coverage is None:
+        if table is not None and coverage is None and isinstance(part, Crossings):
             # Neighbours along a row are mostly alike.
             begins = np.flatnonzero((np.diff(index, prepend=-1) != 0) | (np.diff(primitive, prepend=-1) != 0))
             index, primitive = index[begins], primitive[begins]
