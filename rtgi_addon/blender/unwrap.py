@@ -9,6 +9,8 @@ from ..effects.atlas.unwrapped import USUAL
 _APART = 2.0
 # Faces that meet at a smaller angle [radians] share an island.
 _ANGLE = 1.15
+# Room between what is projected one way and another: faces about an edge that touch there would be packed as one island.
+_BETWEEN = 0.01
 
 
 def unwrap(context, obj, density: float) -> str:
@@ -27,7 +29,7 @@ def unwrap(context, obj, density: float) -> str:
     try:
         bpy.ops.object.mode_set(mode="EDIT")
         bpy.ops.mesh.select_all(action="SELECT")
-        bpy.ops.uv.smart_project(angle_limit=_ANGLE, island_margin=0.0)
+        bpy.ops.uv.smart_project(angle_limit=_ANGLE, island_margin=_BETWEEN)
         bpy.ops.uv.select_all(action="SELECT")
         bpy.ops.uv.average_islands_scale()
         # What is added is scaled with the islands: so many texels, whatever room there is. For a share of the map's width, as

@@ -12,15 +12,22 @@ _SAME = 1.0 / 64.0
 _NOTHING, _SEVERAL = -1, -2
 
 
+def islands_of(corners: np.ndarray, on_sheet: np.ndarray) -> np.ndarray:
+    """(t,) int64, from 0 on: the island of each triangle with ``corners`` (t, 3, 3) that lie ``on_sheet`` (t, 3, 2) [texels]; those
+    that share a corner in space and on the sheet belong together."""
+    _, point = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+    places = np.rint(on_sheet.reshape(-1, 2) / _SAME).astype(np.int64)
+    _, corner = np.unique(np.column_stack([point.reshape(-1), places]), axis=0, return_inverse=True)
+    corner = corner.reshape(-1, 3)
+    return np.unique(connected(corner, int(corner.max(initial=-1)) + 1), return_inverse=True)[1].reshape(-1)
+
+
 def bleeding(part: Part, sheet: Sheet, scene: Scene, geometry: Geometry, places: Places) -> float:
     """The share of the surface of ``part``, whose ``places`` these are, that reads texels of islands other than its own: lit by
     them, or filled from them."""
     mesh = scene.meshes[scene.instances[part.instance].mesh]
-    on_sheet = np.rint(texture_space(mesh.uv_layers[part.uv_map]).reshape(-1, 2) * (part.scale / _SAME)).astype(np.int64)
-    _, point = np.unique(mesh.vertices_local[mesh.triangles].reshape(-1, 3), axis=0, return_inverse=True)
-    _, corner = np.unique(np.column_stack([point.reshape(-1), on_sheet]), axis=0, return_inverse=True)
-    corner = corner.reshape(-1, 3)
-    island = connected(corner, int(corner.max()) + 1)[geometry.local_triangle[places.triangle]]
+    on_sheet = texture_space(mesh.uv_layers[part.uv_map]) * part.scale
+    island = islands_of(mesh.vertices_local[mesh.triangles], on_sheet)[geometry.local_triangle[places.triangle]]
     row, column = np.divmod(places.texel, sheet.size[1])
     row, column = row - part.y, column - part.x
     owner = _owners(row, column, island, (part.height, part.width))

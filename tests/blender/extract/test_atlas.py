@@ -12,6 +12,7 @@ import rtgi_addon
 from rtgi_addon.blender.extract import extract_scene
 from rtgi_addon.blender.fingerprint import fingerprint
 from rtgi_addon.effects.atlas.bake import require_atlas
+from rtgi_addon.effects.atlas.islands import islands_of
 from rtgi_addon.effects.atlas.settings import AtlasSettings
 from rtgi_addon.effects.atlas.unwrapped import lay_out, places_of
 from rtgi_addon.transport.surfaces.geometry import flatten
@@ -64,6 +65,19 @@ def test_unwrapping_gives_a_map_that_can_be_baked(cubes):
         assert len(np.unique(places.triangle)) == 12
     assert next(layer.name for layer in cubes[0].data.uv_layers if layer.active_render) == shown
     assert all(obj.select_get() for obj in cubes) and bpy.context.mode == "OBJECT"
+
+
+def test_faces_about_an_edge_are_islands_apart(cubes):
+    """Smart UV Project laid two sides of this one edge to edge, and each read the other's light."""
+    corners = [(x, y, z) for z in (-0.7, 0.7) for y in (-0.45, 0.45) for x in (-0.099, 0.099)]
+    cubes[0].data = bpy.data.meshes.new("jamb")
+    cubes[0].data.from_pydata(corners, [], [(0, 4, 6, 2), (1, 3, 7, 5), (0, 1, 5, 4), (2, 6, 7, 3), (0, 2, 3, 1), (4, 5, 7, 6)])
+    bpy.ops.object.select_all(action="DESELECT")
+    cubes[0].select_set(True)
+    bpy.ops.rtgi.unwrap_atlas()
+    built = read()
+    mesh = built.meshes[next(item for item in built.instances if item.name == cubes[0].name).mesh]
+    assert islands_of(mesh.vertices_local[mesh.triangles], 100.0 * mesh.uv_layers["Lightmap"]).max() == 5
 
 
 def test_the_atlas_puts_a_bake_out_of_date(cubes):
