@@ -1,8 +1,9 @@
 """How far a light atlas is from the path tracer on the surfaces that it covers, and how visible its seams are.
 
-    python benchmarks/atlas.py [samples...] [--density 8] [--rays 256] [--points 384] [--noise 0.01] [--seed 7]
+    python benchmarks/atlas.py [samples...] [--even] [--density 8] [--rays 256] [--points 384] [--noise 0.01] [--seed 7]
 
-Every object of a sample is unwrapped as the panel does it (Blender's Smart UV Project, islands two texels apart).
+Every object of a sample is unwrapped as the panel does it (Blender's Smart UV Project, islands two texels apart), and its islands
+are fitted to the light on them; `--even` leaves that out.
 Error: relative RMSE of irradiance under the surfaces' own normals at points that rays from the volumes' open probes meet, less the
 reference's noise. Steps: between what is read on both sides of a seam and, of places half a texel to both
 sides of points inside islands, between what is read there; the largest of each, and the 99th percentile.
@@ -37,8 +38,8 @@ from rtgi_addon.transport.context import LightContext  # noqa: E402
 SAMPLES = ("cornell_box", "two_rooms", "sun_window")
 
 
-def unwrapped(sample: str, density: float):
-    """The scene of ``sample`` with all of its objects unwrapped and in the atlas."""
+def unwrapped(sample: str, density: float, fit: bool = False):
+    """The scene of ``sample`` with all of its objects unwrapped and in the atlas, islands even or ``fit`` to their light."""
     path = Path(sample) if sample.endswith(".blend") else ROOT / "sample_blends" / f"{sample}.blend"
     bpy.ops.wm.open_mainfile(filepath=str(path.resolve()))
     for obj in bpy.context.scene.objects:
@@ -47,6 +48,9 @@ def unwrapped(sample: str, density: float):
         obj.data = obj.data.copy()
         unwrap(bpy.context, obj, density)
         obj.rtgi.atlas, obj.rtgi.atlas_uv = True, "Lightmap"
+    if fit:
+        bpy.context.scene.rtgi.atlas.density = density
+        bpy.ops.rtgi.fit_atlas()
     return extract_scene()
 
 
@@ -93,6 +97,7 @@ def main() -> None:
     """Measure, and print a table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("samples", nargs="*", default=SAMPLES)
+    parser.add_argument("--even", action="store_true", help="leave islands as large as their surfaces")
     parser.add_argument("--density", type=float, default=8.0)
     parser.add_argument("--rays", type=int, default=256)
     parser.add_argument("--points", type=int, default=384)
@@ -103,7 +108,7 @@ def main() -> None:
     lines = ["| sample | sheet | texels | CPU time | error | noise of reference | seams, largest (99 %) | inside, largest (99 %) |",
              "|---|---:|---:|---:|---:|---:|---:|---:|"]
     for sample in options.samples:
-        scene = unwrapped(sample, options.density)
+        scene = unwrapped(sample, options.density, not options.even)
         started = time.process_time()
         atlas = bake_atlas(scene, None, AtlasSettings(density=options.density, rays=options.rays)).atlas
         seconds = time.process_time() - started

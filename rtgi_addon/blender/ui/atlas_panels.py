@@ -1,22 +1,32 @@
 """The light atlas in the interface: which objects are in it, by which UV map, and how it is baked."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import bpy
+import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...effects.atlas.settings import ATLAS
+from ...effects.atlas.uneven import uneven
+from ...effects.atlas.unwrapped import USUAL
 from ...errors import BakeError
 from ...exchange.atlas_files import INDEX
 from ..atlas_materials import remove, set_up, shows_atlas
 from ..bundles import bundle_folders
+from ..extract import extract_scene
 from ..session import session
 from ..translations import sentence
-from ..unwrap import unwrap
+from ..unwrap import fit_islands, unwrap
+from ..worker import Job
+from .modal_job import CancelJob, ModalJob, register_job, unregister_job
 from .panel_kinds import Closed, InObject, InRender, split
 from .panels import draw_setting
+from .properties import atlas_settings
 from .role_properties import atlas_map
+from .sidebar import draw_job
+
+fitting = Job()
 
 
 class RTGI_OT_unwrap_atlas(bpy.types.Operator):
@@ -46,6 +56,66 @@ class RTGI_OT_unwrap_atlas(bpy.types.Operator):
             obj.rtgi.atlas, obj.rtgi.atlas_uv = True, ""
         self.report({"INFO"}, rpt_("Unwrapped {0} meshes for the light atlas").format(len(done)))
         return {"FINISHED"}
+
+
+class RTGI_OT_fit_atlas(ModalJob, bpy.types.Operator):
+    """Give more of the texels of maps unwrapped for the light atlas to islands whose light is uneven, as two coarse bakes tell"""
+
+    bl_idname = "rtgi.fit_atlas"
+    bl_label = "Fit Islands to Light"
+    bl_options = {"REGISTER", "UNDO"}
+    job = fitting
+    noun = "fit of the light atlas"
+
+    @classmethod
+    def poll(cls, context):
+        """Object mode, while nothing else traces rays."""
+        return context.mode == "OBJECT" and cls._free(rpt_("A bake or another fit is already running"))
+
+    def _work(self, context):
+        meshes = _to_fit(context.scene)
+        if not meshes:
+            raise BakeError("no object has a map of Unwrap for Light Atlas that could be fitted to light",
+                            "select objects and unwrap them for the light atlas")
+        names = {obj.name for objects in meshes.values() for obj in objects}
+        scene, settings, seed = extract_scene(context=context), atlas_settings(context.scene), context.scene.rtgi.seed
+        # Maps of other objects are no concern of it.
+        scene = replace(scene, instances=tuple(each if each.name in names else replace(each, atlas=None)
+                                               for each in scene.instances))
+        return lambda progress: uneven(scene, settings, seed, None, progress)
+
+    def _done(self, found):
+        scene, count = bpy.data.scenes[self._scene], 0
+        told = {part.name for part in found.sheet.parts}
+        for objects in _to_fit(scene).values():
+            names = [obj.name for obj in objects if obj.name in told and obj.name in bpy.context.view_layer.objects]
+            if names:
+                # Of objects that share a mesh the one whose light is the least even decides.
+                fit_islands(bpy.context, bpy.data.objects[names[0]], scene.rtgi.atlas.density,
+                            lambda uv, names=names: np.fmax.reduce([found.of(name, uv) for name in names]))
+                count += 1
+        self.report({"INFO"}, rpt_("Fitted the islands of {0} meshes to their light").format(count))
+
+    def _cancelled(self, outcome):
+        return rpt_("Fit cancelled; maps are as they were")
+
+
+class RTGI_OT_cancel_fit_atlas(CancelJob, bpy.types.Operator):
+    """Stop measuring light. Maps stay as they are"""
+
+    bl_idname = "rtgi.cancel_fit_atlas"
+    bl_label = "Cancel Fit"
+    job = fitting
+
+
+def _to_fit(scene: bpy.types.Scene) -> dict:
+    """Of meshes whose map is the operator's, the objects of ``scene`` in the light atlas that read it."""
+    meshes = {}
+    for obj in scene.objects:
+        if (obj.type == "MESH" and not obj.hide_render and atlas_map(obj) in ("", USUAL) and obj.data.library is None
+                and USUAL in obj.data.uv_layers):
+            meshes.setdefault(obj.data, []).append(obj)
+    return meshes
 
 
 class RTGI_OT_show_atlas(bpy.types.Operator):
@@ -134,11 +204,24 @@ class RTGI_PT_render_atlas(Closed, InRender, bpy.types.Panel):
         column.enabled, column.active = not session.running, count > 0
         for item in fields(ATLAS.Settings):
             draw_setting(column, group, ATLAS, item)
+        if count:
+            draw_job(layout, context, fitting, lambda row: row.operator(RTGI_OT_fit_atlas.bl_idname, icon="UV_ISLANDSEL"),
+                     RTGI_OT_cancel_fit_atlas.bl_idname)
         row = layout.row(align=True)
         row.enabled = not session.running
         row.operator(RTGI_OT_show_atlas.bl_idname, icon="MATERIAL")
         row.operator(RTGI_OT_hide_atlas.bl_idname, text="", icon="X")
 
 
-_CLASSES = RTGI_OT_unwrap_atlas, RTGI_OT_show_atlas, RTGI_OT_hide_atlas, RTGI_PT_object_atlas, RTGI_PT_render_atlas
-register, unregister = bpy.utils.register_classes_factory(_CLASSES)
+_CLASSES = (RTGI_OT_unwrap_atlas, RTGI_OT_fit_atlas, RTGI_OT_cancel_fit_atlas, RTGI_OT_show_atlas, RTGI_OT_hide_atlas,
+            RTGI_PT_object_atlas, RTGI_PT_render_atlas)
+
+
+def register() -> None:
+    """Register the operators and the panels."""
+    register_job(fitting, *_CLASSES)
+
+
+def unregister() -> None:
+    """Take them out; a fit under way ends."""
+    unregister_job(fitting, *_CLASSES)

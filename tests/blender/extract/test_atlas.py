@@ -80,6 +80,37 @@ def test_faces_about_an_edge_are_islands_apart(cubes):
     assert islands_of(mesh.vertices_local[mesh.triangles], 100.0 * mesh.uv_layers["Lightmap"]).max() == 5
 
 
+def test_islands_are_fitted_to_light(cubes):
+    """A cube whose top is lit from near by: its island becomes the largest, and texels stay as many."""
+    light = bpy.data.lights.new("lamp", "POINT")
+    light.energy, light.rtgi.bake = 200.0, "ALL"
+    lamp = bpy.data.objects.new("lamp", light)
+    lamp.location = (0.4, 0.3, 1.3)
+    bpy.context.collection.objects.link(lamp)
+    bpy.data.objects.remove(cubes[1])
+    with pytest.raises(RuntimeError, match="no object has a map of Unwrap for Light Atlas"):
+        bpy.ops.rtgi.fit_atlas()
+    bpy.ops.object.select_all(action="DESELECT")
+    cubes[0].select_set(True)
+    bpy.context.view_layer.objects.active = cubes[0]
+    bpy.ops.rtgi.unwrap_atlas()
+    known = []
+    for fit in (False, True):
+        if fit:
+            assert bpy.ops.rtgi.fit_atlas() == {"FINISHED"}
+        built = read()
+        require_atlas(built, AtlasSettings())
+        geometry = flatten(built)
+        sheet = lay_out(built, geometry, AtlasSettings())
+        places = places_of(sheet.parts[0], sheet, built, geometry)
+        share = np.bincount(geometry.local_triangle[places.triangle], minlength=12)
+        known.append((len(places.texel), share, geometry.normals_world[:, 2] > 0.5))
+    (before, even, _), (after, fitted, top) = known
+    assert abs(after / before - 1.0) < 0.05 and np.ptp(even) < 0.1 * even.max()
+    assert fitted[top].min() > 2.0 * fitted[~top].max()
+    assert cubes[0].select_get() and bpy.context.mode == "OBJECT"
+
+
 def test_the_atlas_puts_a_bake_out_of_date(cubes):
     def digest():
         bpy.context.view_layer.update()

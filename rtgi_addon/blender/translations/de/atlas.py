@@ -6,6 +6,15 @@ ATLAS_LABELS: dict[str, str] = {
     "Unwrap for Light Atlas": "Für den Lichtatlas abwickeln",
     "Give the selected meshes a UV map for the light atlas, called Lightmap: no overlaps, islands apart by its texels":
         "Den ausgewählten Meshes eine UV-Map namens Lightmap für den Lichtatlas geben: ohne Überlappung, mit Abstand",
+    "Fit Islands to Light": "Inseln dem Licht anpassen",
+    "Give more of the texels of maps unwrapped for the light atlas to islands whose light is uneven, as two coarse bakes tell":
+        "Von den Texeln der Maps, die für den Lichtatlas abgewickelt sind, mehr den Inseln mit ungleichem Licht geben, wie zwei "
+        "grobe Backvorgänge es zeigen",
+    "A bake or another fit is already running": "Es läuft bereits ein Backvorgang oder eine Anpassung",
+    "Fitted the islands of {0} meshes to their light": "Die Inseln von {0} Meshes ihrem Licht angepasst",
+    "Fit cancelled; maps are as they were": "Anpassung abgebrochen; die Maps sind wie zuvor",
+    "Stop measuring light. Maps stay as they are": "Das Messen des Lichts beenden. Die Maps bleiben, wie sie sind",
+    "Cancel Fit": "Anpassung abbrechen",
     "Show in Materials": "In Materialien zeigen",
     "Let EEVEE show the baked light atlas: materials of its objects get an output for EEVEE alone that reads its images":
         "EEVEE den gebackenen Lichtatlas zeigen lassen: Materialien seiner Objekte erhalten eine Ausgabe nur für EEVEE, die seine "
@@ -82,6 +91,9 @@ ATLAS: dict[str, str] = {
     "lower its Density (--set atlas.density), or raise its Largest Side (--set atlas.largest)":
         "die Dichte senken (--set atlas.density) oder die größte Seite erhöhen (--set atlas.largest)",
     "UV map {0} of {1} holds values that are not finite": "die UV-Map {0} von {1} enthält Werte, die nicht endlich sind",
+    "no object has a map of Unwrap for Light Atlas that could be fitted to light":
+        "kein Objekt hat eine Map von „Für den Lichtatlas abwickeln“, die dem Licht angepasst werden könnte",
+    "select objects and unwrap them for the light atlas": "Objekte auswählen und für den Lichtatlas abwickeln",
     "unwrap it anew": "neu abwickeln",
     "UV map {0} of {1} gives no area to {2} % of its surface": "die UV-Map {0} von {1} gibt {2} % seiner Oberfläche keine Fläche",
     "unwrap it anew (UV > Lightmap Pack)": "neu abwickeln (UV > Lightmap packen)",
