@@ -31,7 +31,7 @@ def three(direction):
 @pytest.mark.parametrize(("look_up", "first"), [(godot, 0.0), (three, -0.25)])
 def test_engines_find_what_blender_shows(tmp_path, look_up, first):
     world = lobed()
-    assert write_sky(tmp_path, world, Y_UP, first)
+    scale = write_sky(tmp_path, world, Y_UP, first)
     planes, _ = read_exr(tmp_path / SKY)
     pixels = np.stack([planes[name] for name in "RGB"], axis=-1).astype(np.float64)
     blender = np.random.default_rng(3).normal(size=(50, 3))
@@ -40,7 +40,7 @@ def test_engines_find_what_blender_shows(tmp_path, look_up, first):
     for direction, radiance in zip(Y_UP.directions(blender), expected, strict=True):
         u, v = look_up(direction)
         found = pixels[min(int(v * pixels.shape[0]), pixels.shape[0] - 1), int(u * pixels.shape[1]) % pixels.shape[1]]
-        np.testing.assert_allclose(found, radiance, atol=0.12)
+        np.testing.assert_allclose(found * scale, radiance, atol=0.12)
 
 
 def test_a_black_world_is_no_sky_and_a_plain_one_is_small(tmp_path):
@@ -48,4 +48,20 @@ def test_a_black_world_is_no_sky_and_a_plain_one_is_small(tmp_path):
     assert not list(tmp_path.iterdir())
     assert write_sky(tmp_path, World.constant((1.0, 2.0, 3.0)), Y_UP, 0.0)
     planes, _ = read_exr(tmp_path / SKY)
-    assert planes["G"].shape == (4, 8) and np.all(planes["G"] == 2.0)
+    scale = write_sky(tmp_path, World.constant((1.0, 2.0, 3.0)), Y_UP, 0.0)
+    assert planes["G"].shape == (4, 8) and np.all(planes["G"] * scale == 2.0)
+
+
+@pytest.mark.parametrize("brightest", [1e6, 1.0, 1e-4, 1e-8])
+def test_what_godot_would_read_as_black_is_stored_over_a_scale(tmp_path, brightest):
+    """Of a night's sky halves would be below 2^-14, which Godot reads as 0."""
+    rows = np.geomspace(1e-6 * brightest, brightest, 32).astype(np.float32)
+    world = World(np.tile(rows[:, None, None], (1, 64, 3)))
+    scale = write_sky(tmp_path, world, Y_UP, 0.0)
+    planes, _ = read_exr(tmp_path / SKY)
+    found = np.where(np.abs(planes["G"]) < 2.0**-14, 0.0, planes["G"].astype(np.float64)) * scale
+    # Samples lie in the middle of the map's rows.
+    right = np.minimum(rows[::-1], 65504.0)
+    assert np.log2(scale) == round(np.log2(scale)) and scale <= 1.0
+    counts = right > 2e-9 * brightest
+    np.testing.assert_allclose(found[counts, 0], right[counts], rtol=1e-3)

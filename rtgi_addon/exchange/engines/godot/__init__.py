@@ -70,6 +70,8 @@ _FILES = Path(__file__).parent / "files"
 _ADDON_FILES = ("surface.gdshaderinc", "surface.gdshader", "surface_double_sided.gdshader", "volumes.gd", "turned_light.gd",
                 "probes.gd", "probes.tscn")
 _SAMPLE_FILES = ("project.godot", "sample.gd")
+# Where sample.gd has what the panorama's pixels are stored over.
+_SKY_SCALE = "const SKY_SCALE := {!r}\n"
 _DAY_FILES = ("day.gd", "day.tscn")
 # What the shader's probes are read from, and how: a 3D texture, or a picture of its slices that is drawn anew as light changes.
 _AS_BAKED = "sampler3D", "texelFetch(probes, texel, 0)"
@@ -146,7 +148,10 @@ class Godot(Engine):
         if settings.model is not None:
             copy_file(settings.model, folder / "model.glb")
             # Godot's panoramas begin at -Z.
-            write_sky(folder, settings.sky, self.axes, 0.0)
+            scale = write_sky(folder, settings.sky, self.axes, 0.0)
+            if scale is not None:
+                script = (_FILES / "sample.gd").read_text(encoding="utf-8")
+                write_text(folder / "sample.gd", script.replace(_SKY_SCALE.format(1.0), _SKY_SCALE.format(scale)))
         if settings.conformance:
             progress.step(0.7, "Writing the conformance kit")
             self._write_kit(folder / KIT, field, media, transfer, spheres, atlas, relit, voxels)

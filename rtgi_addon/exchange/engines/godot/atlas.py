@@ -6,8 +6,9 @@ from pathlib import Path
 from ..atlas import EngineAtlas, atlas_glsl, require_texture
 from ..atlas_transfer import EngineAtlasTransfer, relight_glsl
 from ..base import write_text
+from ..halves import half_scale, over
 from .media import write_slices
-from .textures import MAX_SIDE, half_scale, over
+from .textures import MAX_SIDE
 
 INDEX, TEXELS = "atlas.json", "atlas/texels.exr"
 RELIT_INDEX, TABLE, SHADER = "atlas_transfer.json", "atlas/transfer.exr", "atlas_relight.gdshader"

@@ -12,10 +12,11 @@ import numpy as np
 from ...exr import write_exr
 from ...flipbook import layout, to_sheet
 from ..base import write_text
+from ..halves import half_scale, over
 from ..media import EngineMedia
 from ..media_shader import media_functions, media_shader
 from ..media_textures import ambient_blocks, cell_blocks
-from .textures import half_scale, import_record, over, require_size
+from .textures import import_record, require_size
 
 INDEX, FOLDER = "media.json", "media"
 # What goes into a project beside what is written here.

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from ..base import write_text
+from ..halves import half_scale, over
 from ..spheres import EngineSpheres, spheres_glsl
 from .media import write_slices
-from .textures import half_scale, over
 
 INDEX, MAPS = "spheres.json", "spheres/maps.exr"
 # What goes into a project beside what is written here.

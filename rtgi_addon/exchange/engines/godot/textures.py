@@ -23,8 +23,6 @@ PROBES, DISTANCES, NODES = "probes.exr", "distances.exr", "nodes.exr"
 _BLOCKS = 8
 # The exponents of the least scale of a probe and of what its largest number is to be at most, a sixteenth of what halves hold.
 _LEAST_SCALE, _LARGEST = -14, 12
-# The exponent of what the largest number of other textures is stored as at most.
-_LARGEST_OF_ALL = 15
 # The end of an import record's name.
 IMPORT = ".import"
 # The least side of 3D textures that Vulkan and desktop OpenGL drivers have.
@@ -76,17 +74,6 @@ def blend_import(theirs: bytes, ours: bytes) -> bytes | None:
     if any('importer="3d_texture"' not in record for record in both) or slices[0].keys() != slices[1].keys():
         return None
     return _SLICES.sub(lambda found: f"{found[1]}={slices[1][found[1]]}", both[0]).encode()
-
-
-def half_scale(values: np.ndarray) -> float:
-    """What to store ``values`` over as halves, 1 at most: a power of two, which loses nothing, for which all that counts beside the
-    largest is above 2^-14: Godot reads halves below that as 0."""
-    return 2.0 ** min(int(np.frexp(np.abs(values).max(initial=0.0))[1]) - _LARGEST_OF_ALL, 0)
-
-
-def over(values: np.ndarray, scale) -> np.ndarray:
-    """``values`` float16 over a ``half_scale`` (or several, that broadcast)."""
-    return (values / np.asarray(scale, np.float32)).astype(np.float16)
 
 
 def _probes(volume: ExportVolume) -> np.ndarray:

@@ -4,9 +4,9 @@ import json
 from pathlib import Path
 
 from ..base import write_text
+from ..halves import half_scale, over
 from ..voxels import LISTS, EngineVoxels, voxels_glsl
 from .media import write_slices
-from .textures import half_scale, over
 
 INDEX, FOLDER = "voxels.json", "voxels"
 # What goes into a project beside what is written here.

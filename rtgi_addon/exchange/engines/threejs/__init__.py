@@ -137,8 +137,9 @@ class ThreeJs(Engine):
             copy_file(settings.model, folder / _MODEL)
         demo = {"model": None if settings.model is None else _MODEL}
         # The panoramas of three.js have +X in their middle.
-        if settings.model is not None and write_sky(folder, settings.sky, self.axes, -0.25):
-            demo["sky"] = SKY
+        sky_scale = None if settings.model is None else write_sky(folder, settings.sky, self.axes, -0.25)
+        if sky_scale is not None:
+            demo |= {"sky": SKY, "skyScale": sky_scale}
         media = engine_media(bundle.media, field, self.axes)
         readme = (_FILES / "README.md").read_text(encoding="utf-8").rstrip()
         transfer, sections = engine_transfer(bundle, self.axes), []

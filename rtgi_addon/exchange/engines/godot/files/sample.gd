@@ -3,6 +3,8 @@ extends Node3D
 
 const MODEL := "res://model.glb"
 const SKY := "res://sky.exr"
+## What the panorama's pixels are to be multiplied by.
+const SKY_SCALE := 1.0
 const MOST_BALLS := 512
 
 @onready var probes: Node3D = $Probes
@@ -52,6 +54,7 @@ func _process(_delta: float) -> void:
 func _show_sky(panorama: Texture2D) -> void:
 	var material := PanoramaSkyMaterial.new()
 	material.panorama = panorama
+	material.energy_multiplier = SKY_SCALE
 	var environment: Environment = $Environment.environment
 	environment.sky = Sky.new()
 	environment.sky.sky_material = material

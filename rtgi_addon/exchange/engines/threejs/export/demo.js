@@ -39,6 +39,7 @@ if (demo.sky) {
   // Behind the model alone: the probes hold its light.
   scene.background = await new EXRLoader().loadAsync(demo.sky);
   scene.background.mapping = THREE.EquirectangularReflectionMapping;
+  scene.backgroundIntensity = demo.skyScale;
 }
 
 let relight = null;
