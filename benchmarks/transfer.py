@@ -1,11 +1,11 @@
 """What relighting from transfer costs and how far it is off: processor time of `rtgi relight`, bytes a probe, and errors by light.
 
-    python benchmarks/transfer.py [samples…] [--probes 2048] [--rays 1024] [--sides 12 18] [--stored]
+    python benchmarks/transfer.py [samples…] [--probes 2048] [--rays 1024] [--sides 18 24] [--stored]
 
 A sample is baked with transfer, with test suns in light groups of their own, which transfer holds exactly: so one bake has both
 a sun by the table of directions and the same sun as a bake would have it. Errors are relative RMSE over the usable probes'
-coefficients, of suns' bounces in shares of each sun's own, and of the brightest sun's. Times are processor time, medians of
-several runs. `--stored` asks what the table of suns is as it is stored, and would be in less: in half floats, in bytes with a
+coefficients, of suns' bounces in shares of those of the suns as high, and of the brightest sun's. Times are processor time, medians
+of several runs. `--stored` asks what the table of suns is as it is stored, and would be in less: in half floats, in bytes with a
 scale for each probe, coefficient and colour, and as products of its strongest singular vectors, in half floats too.
 """
 
@@ -114,7 +114,8 @@ def measure(name: str, probes: int, rays: int, side: int, stored: bool) -> None:
     print("  elevation   off, of its bounce   off, of the brightest bounce   its bounce, of the brightest")
     for elevation in ELEVATIONS:
         off, size = np.array([row[1:] for row in rows if row[0] == elevation]).T
-        own = 100 * np.mean(off / np.maximum(size, 1e-12))
+        # Of all azimuths together, at some of which a room gets nothing.
+        own = 100 * np.linalg.norm(off) / np.linalg.norm(size)
         print(f"  {elevation:8.1f}° {own:17.1f} % {100 * np.mean(off) / brightest:26.2f} % "
               f"{100 * np.mean(size) / brightest:27.2f} %", flush=True)
     if stored:
@@ -127,7 +128,7 @@ def main() -> None:
     parser.add_argument("samples", nargs="*", default=SAMPLES)
     parser.add_argument("--probes", type=int, default=2048)
     parser.add_argument("--rays", type=int, default=1024)
-    parser.add_argument("--sides", type=int, nargs="+", default=[18])
+    parser.add_argument("--sides", type=int, nargs="+", default=[24])
     parser.add_argument("--stored", action="store_true")
     arguments = parser.parse_args()
     for name in arguments.samples:

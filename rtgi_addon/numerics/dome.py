@@ -15,7 +15,24 @@ POWER = 1.5
 
 def directions(side: int, below: bool = False) -> np.ndarray:
     """Unit directions (side², 3) float64 of the nodes, or (2·side², 3) with those ``below``."""
-    steps = 2.0 * np.arange(side) / (side - 1) - 1.0
+    return _at(2.0 * np.arange(side) / (side - 1) - 1.0, below)
+
+
+def samples(side: int, fineness: int, below: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    """Directions all over a dome of ``side``² nodes, and how to fit nodes to what is found in them.
+
+    The directions (m², 3), or (2·m², 3) with those ``below``, m = ``fineness``·(side − 1) + 2, lie in rows and columns as nodes do,
+    ``fineness``² in each square between four nodes, and on its border, the horizon, where nothing beyond holds the fit. Nodes
+    F·V·Fᵀ, of the values V (m, m) in one dome's directions and the matrix F (side, m), are those whose bilinear reading is nearest
+    to V, in squares.
+    """
+    places = np.concatenate([[0.0], (np.arange(fineness * (side - 1)) + 0.5) / fineness, [side - 1.0]])
+    tents = np.maximum(1.0 - np.abs(places[:, None] - np.arange(side)), 0.0)
+    return _at(2.0 * places / (side - 1) - 1.0, below), np.linalg.solve(tents.T @ tents, tents.T)
+
+
+def _at(steps: np.ndarray, below: bool) -> np.ndarray:
+    """Directions of the places (v, u) of the square that have both from ``steps`` (s,), v first."""
     v, u = np.meshgrid(steps, steps, indexing="ij")
     x, y = 0.5 * (u + v).ravel(), 0.5 * (u - v).ravel()
     away = np.abs(x) + np.abs(y)

@@ -109,7 +109,7 @@ def test_what_is_beside_a_plan_is_told():
     from rtgi_addon.jobs.plan_beside import beside
     atlas, transfer = beside(cut_floor(), 1000)
     assert atlas.startswith("The light atlas is baked beside it, at its defaults 40 x 40 texels by at most ")
-    assert "would store 20.8 kB a probe at its defaults, at most 19.9 MiB for these (6.8 kB with --set sun_vectors=64)" in transfer
+    assert "would store 35.0 kB a probe at its defaults, at most 33.3 MiB for these (7.3 kB with --set sun_vectors=64)" in transfer
 
 
 def test_a_fitted_volume_is_planned_and_keeps_the_probes_in_its_air(tmp_path):

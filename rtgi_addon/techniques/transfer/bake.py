@@ -11,10 +11,11 @@ import numpy as np
 
 from ...numerics import dome, sh
 from ...progress import Progress
-from ...scene import PointLight, ProbeVolume, Scene, SunLight
+from ...scene import PointLight, ProbeVolume
 from ...scene.memory import require_memory
 from ...transport.cache.columns import sky_columns, solve_columns, source_columns
 from ...transport.cache.relighting import light_again
+from ...transport.cache.sun_columns import sun_columns
 from ...transport.cache.surface_cache import Traced
 from ...transport.context import LightContext
 from ...transport.parallel import parallel_for, thread_count
@@ -36,8 +37,8 @@ from .settings import TransferSettings
 
 # Samples of each lamp that has an extent, where its direct light is in the bake.
 LAMP_SAMPLES = 64
-# Points of a texel at which a sun or a lamp at a site is sampled: many texels make a probe's light.
-SUN_SAMPLES = 4
+# Points of a texel at which a lamp at a site is sampled: many texels make a probe's light.
+SITE_SAMPLES = 4
 # The solution of a column may be off by this share of the target.
 SOLVER_SHARE, COLUMN_SHARE = 0.01, 0.03
 # A lamp at a site is a ball of this share of the least distance between sites, so that no texel is lit by a point that touches it.
@@ -170,10 +171,11 @@ class TransferBake:
         """What texels (n + 1, C, 3) receive of each by themselves."""
         settings = self._settings
         skies = sky_columns(self.cache, settings.sky_order, progress.span(0.0, 0.08))
-        lamps = [*_suns(dome.directions(settings.sun_side, settings.sun_below)),
-                 *_sites(self.site_positions)]
-        context = LightContext(_with_lamps(self._dark.scene, lamps), self._dark.threads, same_surfaces=self._dark)
-        return np.concatenate([skies, source_columns(self.cache, context, SUN_SAMPLES, progress.span(0.08, 1.0))], axis=1)
+        suns = sun_columns(self.cache, self._dark, settings.sun_side, settings.sun_below, progress.span(0.08, 0.8))
+        context = LightContext(replace(self._dark.scene, lights=_sites(self.site_positions)), self._dark.threads,
+                               same_surfaces=self._dark)
+        sites = source_columns(self.cache, context, SITE_SAMPLES, progress.span(0.8, 1.0))
+        return np.concatenate([skies, suns, sites], axis=1)
 
     def _gather(self, gatherers: list[Gatherer], irradiance: np.ndarray | None, progress: Progress) -> _Sums:
         settings, count = self._settings, len(self._placement.positions)
@@ -302,19 +304,11 @@ def items_of(probes: np.ndarray, rays: int) -> list[Item]:
     return items
 
 
-def _suns(towards: np.ndarray) -> list[SunLight]:
-    return [SunLight(f"sun {number}", -direction, np.ones(3, np.float32)) for number, direction in enumerate(towards)]
-
-
-def _sites(positions: np.ndarray) -> list[PointLight]:
+def _sites(positions: np.ndarray) -> tuple[PointLight, ...]:
     if not len(positions):
-        return []
+        return ()
     gaps = np.linalg.norm(positions[:, None] - positions[None], axis=2)
     gaps[np.diag_indices(len(positions))] = np.inf
     radius = SITE_RADIUS * float(gaps.min()) if len(positions) > 1 else 0.0
     strength = np.full(3, 1.0 / (4.0 * np.pi), np.float32)
-    return [PointLight(f"site {number}", position, strength, radius, False) for number, position in enumerate(positions)]
-
-
-def _with_lamps(scene: Scene, lamps) -> Scene:
-    return replace(scene, lights=tuple(lamps))
+    return tuple(PointLight(f"site {number}", position, strength, radius, False) for number, position in enumerate(positions))

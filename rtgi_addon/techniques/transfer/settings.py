@@ -18,11 +18,11 @@ class TransferSettings:
                                   0, 1000)
     sky_order: int = setting(2, "Sky Order", "Highest band of the skies that are transferred exactly; what of a sky is beyond goes "
                              "by the sun's directions", "", 0, 4)
-    sun_side: int = setting(18, "Sun Directions", "Side of the square grid of directions from which the sun is transferred: 18 "
-                            "are 324 directions", "", 3, 64)
+    sun_side: int = setting(24, "Sun Directions", "Side of the square grid of directions from which the sun is transferred: 24 "
+                            "are 576 directions", "", 3, 64)
     sun_below: bool = setting(False, "Sun from Below", "Transfer suns from below the horizon as well, for twice the storage")
     sun_vectors: int = setting(0, "Sun Vectors", "Store suns as products with so many vectors that all probes share: 64 take a "
-                               "fifth of 324 directions; 0 stores all", "", 0, 1024)
+                               "fifth of 576 directions; 0 stores all", "", 0, 1024)
     sites: int = setting(32, "Lamp Sites", "Probes at which a lamp is transferred to all the others, for lamps that the bake does "
                          "not know", "", 0, 256)
     half: bool = setting(True, "Half Floats", "Store what sky, suns and lamp sites give in 16 bits")

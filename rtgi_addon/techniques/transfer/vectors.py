@@ -1,6 +1,6 @@
 """A table of suns as products with few vectors that all probes share: its strongest principal components.
 
-Neighbouring directions light much the same strip of wall, so that a table of 324 has the content of fewer. After P.-P. Sloan,
+Neighbouring directions light much the same strip of wall, so that a table of hundreds has the content of fewer. After P.-P. Sloan,
 J. Hall, J. Hart and J. Snyder, "Clustered Principal Components for Precomputed Radiance Transfer", SIGGRAPH 2003, with one cluster;
 what it loses by number is in docs/techniques/transfer.md.
 """

@@ -240,14 +240,14 @@ SETTINGS: dict[str, str] = {
     "Highest band of the skies that are transferred exactly; what of a sky is beyond goes by the sun's directions":
         "Höchstes Band der Himmel, die genau übertragen werden; was ein Himmel darüber hinaus hat, geht über die Sonnenrichtungen",
     "Sun Directions": "Sonnenrichtungen",
-    "Side of the square grid of directions from which the sun is transferred: 18 are 324 directions":
-        "Seitenlänge des quadratischen Gitters von Richtungen, aus denen die Sonne übertragen wird: 18 sind 324 Richtungen",
+    "Side of the square grid of directions from which the sun is transferred: 24 are 576 directions":
+        "Seitenlänge des quadratischen Gitters von Richtungen, aus denen die Sonne übertragen wird: 24 sind 576 Richtungen",
     "Sun from Below": "Sonne von unten",
     "Transfer suns from below the horizon as well, for twice the storage":
         "Auch Sonnen unter dem Horizont übertragen, für doppelten Speicher",
     "Sun Vectors": "Sonnenvektoren",
-    "Store suns as products with so many vectors that all probes share: 64 take a fifth of 324 directions; 0 stores all":
-        "Sonnen als Produkte mit so vielen Vektoren speichern, die alle Sonden teilen: 64 brauchen ein Fünftel von 324 Richtungen; "
+    "Store suns as products with so many vectors that all probes share: 64 take a fifth of 576 directions; 0 stores all":
+        "Sonnen als Produkte mit so vielen Vektoren speichern, die alle Sonden teilen: 64 brauchen ein Fünftel von 576 Richtungen; "
         "0 speichert alle",
     "Lamp Sites": "Lampenorte",
     "Probes at which a lamp is transferred to all the others, for lamps that the bake does not know":
