@@ -3,7 +3,7 @@
     python benchmarks/accuracy.py [samples…] [--seeds 4]
 
 Twenty-four probes of each sample's own lattice (tests/references), the reference's variance subtracted. *Estimated* is the noise
-that the bake reports of all usable probes, which knows nothing of the surface cache's error; *within* the share of all bakes that
+that the bake reports of all usable probes, of their rays and those of the surface cache; *within* the share of all bakes that
 are within their target.
 """
 

@@ -36,11 +36,19 @@ POOLED = 0.5
 LEAST_GAIN, MOST_GAIN = 0.2, 1.0
 # Weight of what earlier rounds said of a probe's error in what the next one makes of it.
 REMEMBERED = 0.5
-# Share of the target left to the sampling of probe rays; the rest is for the surface cache.
+# Share of the target that is aimed at by the noise of probe rays and of the surface cache together, and what is left to probe rays
+# at least, however noisy the cache is.
+AIM, LEAST_SHARE = 0.8, 0.5
+# What is left to probe rays usually: by that their numbers are told before the cache's noise is known.
 SAMPLING_SHARE = 0.75
 # The mean over all probes is held to the target, so that half of those that lie between two powers of two are above it and half
 # below; no group of probes is left with more than this times the variance that goes with it.
 MOST_ABOVE = 2.0
+
+
+def sampling_share(cache_noise: float, target: float) -> float:
+    """Share of ``target`` that is left to the noise of probe rays beside ``cache_noise``, a relative mean square."""
+    return float(np.sqrt(max(AIM**2 - cache_noise / target**2, LEAST_SHARE**2)))
 
 
 class ErrorModel:

@@ -1,7 +1,6 @@
 """The bake: place probes, trace in rounds, grow the surface cache with what rays meet, stop each probe when it is good enough."""
 
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -22,11 +21,12 @@ from ..lamp_light import LampLight
 from ..lattice.coverage import require_open
 from ..lattice.focus import focus, spacing_of
 from ..lattice.placement import Placement, place
-from .adaptive import FIRST_ROUND, SAMPLING_SHARE, ErrorModel
+from .adaptive import FIRST_ROUND, ErrorModel, sampling_share
+from .cache_noise import cache_noise
 from .distances import mean_distances
 from .gather import GROUP, RAYS_PER_LIGHT_SAMPLE, Gatherer, gather
 from .item_rays import BLOCK_RAYS, ITEM_RAYS
-from .items import Item
+from .items import Item, batches
 from .memory import RayBytes, later_bytes, working_bytes
 from .reach import Reach, reach_of
 from .relight import MAX_KEPT_RAYS, HitMemory
@@ -99,6 +99,7 @@ class ProbeBake:
                  progress: Progress, checkpoint: Checkpoint, name: str, lamp_light: LampLight, begun: Begun | None = None,
                  block: Block | None = None):
         self.context, self.volumes, self.settings, self.lamp_light = context, volumes, settings, lamp_light
+        self._seed = seed
         self._progress, self._checkpoint, self._name = progress, checkpoint, name
         started, known = (), block is not None
         if block is None:
@@ -130,6 +131,7 @@ class ProbeBake:
         self.emitted = np.zeros_like(self.model.total) if context.surfaces.has_emission or context.media.is_emissive else None
         self._goal: np.ndarray | None = None
         self._needed: np.ndarray | None = None
+        self._cache_noise: float | None = None
         self._round = self._next = self.ray_count = 0
         self.memory = HitMemory()
         if context.media.scatters:
@@ -213,8 +215,10 @@ class ProbeBake:
         """Rays (p,) that the probes are now thought to take to the target."""
         if self._needed is None:
             probes, self._needed = np.flatnonzero(self.placement.measured), self.model.rays.copy()
-            self._needed[probes] = self.model.rays_needed(probes, self._groups(probes), self.settings.error * SAMPLING_SHARE,
-                                                          self._most)
+            if self._cache_noise is None:
+                self._cache_noise = cache_noise(self.gatherer, probes, self.model.scale(probes), self._seed)
+            target = self.settings.error * sampling_share(self._cache_noise, self.settings.error)
+            self._needed[probes] = self.model.rays_needed(probes, self._groups(probes), target, self._most)
         return self._needed
 
     def _expected_rays(self) -> float:
@@ -265,7 +269,7 @@ class ProbeBake:
         items alone, so the result is the same for any number of threads."""
         items, expected, started, before = self._items(), self._expected_rays(), time.monotonic(), self.ray_count
         of_texel = TEXEL_COST * self.cache.rays
-        for batch in batches(items[self._next:]):
+        for batch in batches(items[self._next:], BATCH_RAYS):
             rays = sum(item.ray_count for item in batch)
             rate = (self.ray_count - before) / max(time.monotonic() - started, 1e-3)
             label = f"probe rays, {rate / 1e6:.1f} M/s" if rate else "probe rays"
@@ -300,7 +304,8 @@ class ProbeBake:
         if self._spreading is not None:
             kept |= labelled("spreading", self._spreading.state())
         return kept | {"numbers": numbers, "goal": self._goal, "sums": self._sums, "distance": self._distance,
-                       "distance_weight": self._distance_weight}
+                       "distance_weight": self._distance_weight,
+                       "cache_noise": np.array([np.nan if self._cache_noise is None else self._cache_noise])}
 
     def _restore(self, arrays: dict[str, np.ndarray]) -> None:
         restore_cache(self.cache, part_of(arrays, "cache"))
@@ -310,6 +315,8 @@ class ProbeBake:
         self._round, self._next, self.ray_count = (int(number) for number in arrays["numbers"])
         self._goal, self._sums = arrays["goal"], arrays["sums"]
         self._distance, self._distance_weight = arrays["distance"], arrays["distance_weight"]
+        noise = float(arrays["cache_noise"][0])
+        self._cache_noise = None if np.isnan(noise) else noise
         self.memory.forget()
 
     def grids(self) -> tuple[ProbeGrid, ...]:
@@ -324,7 +331,9 @@ class ProbeBake:
             self._progress.step(TRACED, "light of lamps")
             coefficients[probes] += self.lamp_light.coefficients(self.placement.positions[probes], self.settings.order)
         error = np.full(len(coefficients), np.nan, np.float32)
-        error[probes] = self.model.error(probes, self._groups(probes)) / np.sqrt(3.0 * coefficients.shape[1])
+        # Of the cache no probe knows its own part.
+        of_cache = np.sqrt(self._cache_noise or 0.0) * self.model.scale(probes)
+        error[probes] = np.hypot(self.model.error(probes, self._groups(probes)), of_cache) / np.sqrt(3.0 * coefficients.shape[1])
         return coefficients.astype(np.float32), error
 
     def cut(self, coefficients: np.ndarray, error: np.ndarray) -> tuple[ProbeGrid, ...]:
@@ -347,18 +356,6 @@ class ProbeBake:
         """Mean and mean squared distance (p, T², 2) after the last round; a cell that no ray fell into takes a mean of those around
         it."""
         return mean_distances(self._distance, self._distance_weight, self.settings.visibility_resolution)
-
-
-def batches(items: list[Item]) -> Iterator[list[Item]]:
-    """``items`` in runs of up to BATCH_RAYS rays: what is held in memory between tracing and shading."""
-    start = 0
-    while start < len(items):
-        stop, rays = start, 0
-        while stop < len(items) and (stop == start or rays + items[stop].ray_count <= BATCH_RAYS):
-            rays += items[stop].ray_count
-            stop += 1
-        yield items[start:stop]
-        start = stop
 
 
 def surface_cache(context: LightContext, volumes: tuple[ProbeVolume, ...], settings: ProbeSettings, seed: int) -> SurfaceCache:

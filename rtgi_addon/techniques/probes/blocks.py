@@ -23,11 +23,12 @@ from ...transport.parallel import parallel_for
 from ..base import BACKFACE_THRESHOLD, Checkpoint, Common, begin_bake, volumes_by_settings
 from ..lattice.coverage import require_open
 from ..lattice.placement import Placement, place
-from .bake import BATCH_RAYS, Block, ProbeBake, batches, surface_cache
+from .bake import BATCH_RAYS, Block, ProbeBake, surface_cache
 from .block_field import BlockField, Bricks, Read
 from .captured import capturing, lamp_light_of
 from .gather import GROUP, Gatherer, gather
 from .gathering import items_of
+from .items import batches
 from .memory import RayBytes, working_bytes
 from .reach import Reach
 from .relight import MAX_KEPT_RAYS
@@ -68,7 +69,7 @@ class _Group:
             probes = measured[::-(-len(measured) * rays // SCOUTS)]
             require_memory(working_bytes(self.cache, settings, Reach(0, 1.0), len(probes), BATCH_RAYS, MAX_KEPT_RAYS))
             items, done = items_of(probes, GROUP, rays), 0
-            for batch in batches(items):
+            for batch in batches(items, BATCH_RAYS):
                 require_memory({"rays": int(RayBytes.of(self.context).held * sum(item.ray_count for item in batch))})
                 span = progress.span(done / len(items), (done + len(batch)) / len(items))
                 traced = parallel_for(lambda i, batch=batch: gatherer.trace(batch[i]), len(batch), self.context.threads,

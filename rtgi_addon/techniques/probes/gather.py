@@ -159,6 +159,17 @@ class Gatherer:
         """The same probes and directions under other light."""
         return Gatherer(context, cache, self._placement, self.settings, self._seed, self._strata)
 
+    def seeded(self, seed: int) -> "Gatherer":
+        """The same probes under the same light, with other directions."""
+        return Gatherer(self.context, self.cache, self._placement, self.settings, seed)
+
+    def read(self, item: Item, traced: Traced, irradiance: np.ndarray, albedo: np.ndarray | None) -> np.ndarray:
+        """Sums (g, m, k, 3) of 4π·L·Y over an item's rays, if what they hit had received ``irradiance`` (h, 3) and nothing else
+        were to be seen; ``albedo`` (h, 3) at the hits (None: each triangle's own)."""
+        colour = np.take(self._albedo, traced.surface.primitive, axis=0) if albedo is None else albedo
+        radiance = irradiance * colour * np.float32(1 / np.pi)
+        return self._projected(item, traced, self.ray_basis(item, traced.directions), radiance, None, None)
+
     def _numbers(self, item: Item, last: int, first: int = 0) -> np.ndarray:
         """Dimensions ``first`` … ``last`` − 1 of the groups' sequences: (g, n, last − first)."""
         index = item.first[:, None] + np.arange(item.count) if item.spread is None else item.spread.order

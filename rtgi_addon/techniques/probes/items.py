@@ -1,5 +1,6 @@
 """Rays of probes in blocks of one shape: what is traced, shaded and projected at a time."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -49,3 +50,15 @@ class Item:
         """The probe (h,) that each of the rays ``rows`` (h,) leaves from."""
         _, n, m = self.shape
         return self.probes.reshape(-1)[rows // (n * m) * m + rows % m]
+
+
+def batches(items: list[Item], most: int) -> Iterator[list[Item]]:
+    """``items`` in runs of up to ``most`` rays: what is held in memory between tracing and shading."""
+    start = 0
+    while start < len(items):
+        stop, rays = start, 0
+        while stop < len(items) and (stop == start or rays + items[stop].ray_count <= most):
+            rays += items[stop].ray_count
+            stop += 1
+        yield items[start:stop]
+        start = stop

@@ -23,7 +23,8 @@ def cache_state(cache: SurfaceCache) -> dict[str, np.ndarray]:
     """Everything that was measured."""
     return {**labelled("table", cache.table.state()), **labelled("bright", cache.bright.arrays()),
             **labelled("rows", cache.rows.arrays()), **labelled("factors", cache.form_factors.arrays()),
-            "irradiance_rest": cache.irradiance_rest, "first_bounce": cache.first_bounce, "solved": np.array(cache.solved)}
+            "irradiance_rest": cache.irradiance_rest, "first_bounce": cache.first_bounce,
+            "bounce_halves": cache.bounce_halves, "solved": np.array(cache.solved)}
 
 
 def restore_cache(cache: SurfaceCache, arrays: dict[str, np.ndarray]) -> None:
@@ -33,4 +34,5 @@ def restore_cache(cache: SurfaceCache, arrays: dict[str, np.ndarray]) -> None:
     cache.rows = TexelRows(**part_of(arrays, "rows"))
     cache.form_factors = FormFactors.of(part_of(arrays, "factors"))
     cache.irradiance_rest, cache.first_bounce = arrays["irradiance_rest"], arrays["first_bounce"]
+    cache.bounce_halves = arrays["bounce_halves"]
     cache.solved = int(arrays["solved"])

@@ -62,6 +62,19 @@ class FormFactors:
                      np.ascontiguousarray(first), result)
         return result
 
+    def difference(self, block: int, radiance: np.ndarray, by_angle: np.ndarray) -> np.ndarray:
+        """By how much the mean (nᵢ, 3), as in ``spread``, of ``radiance`` (n + 1, 4) is more over the first half of the rays of a
+        ``block`` than over the second. ``by_angle`` as in ``seen``."""
+        half, total = self.rays // 2, np.zeros((2, self.hits[block].shape[1], 3), np.float32)
+        if self.is_plain and kernels.is_available():
+            for start in range(0, len(self.hits[block]), half):
+                part, own = np.ascontiguousarray(self.hits[block][start:start + half]), total[start // half % 2]
+                kernels.call("spread", len(radiance), radiance, *part.shape, part, np.pi / half, own.copy(), own)
+        else:
+            seen = self.seen(block, radiance, by_angle)[..., :3]
+            total = seen.reshape(-1, 2, half, *seen.shape[1:]).sum(axis=(0, 2)) * np.float32(np.pi / half)
+        return total[0] - total[1]
+
     def spans(self) -> list[slice]:
         """The texels of each block."""
         ends = np.cumsum([block.shape[1] for block in self.hits], dtype=np.int64).tolist()

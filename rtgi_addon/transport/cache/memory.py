@@ -2,7 +2,7 @@
 
 # What is kept of a texel, of each of its rays, with what they see by the angle and through tints, and of each of the sources that
 # it may choose; more while all rays are put together, or while the solver mixes what came of its last steps.
-BYTES_PER_TEXEL, BYTES_PER_RAY, BYTES_PER_ANGLE, BYTES_PER_TINT, BYTES_PER_CHOICE = 150, 8, 2, 6, 6
+BYTES_PER_TEXEL, BYTES_PER_RAY, BYTES_PER_ANGLE, BYTES_PER_TINT, BYTES_PER_CHOICE = 174, 8, 2, 6, 6
 BYTES_PER_RAY_IN_FLIGHT, BYTES_PER_TEXEL_SOLVED = 24, 580
 
 

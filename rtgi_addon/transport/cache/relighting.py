@@ -37,7 +37,7 @@ def relit_cache(cache: SurfaceCache, context: LightContext, progress: Progress) 
         surface = cache.sampler.on_texels(texels, cache.points if world_changed else cache.lamp_samples)
         sky = rows.irradiance_sky[texels]
         if world_changed:
-            sky = other.sky_again(slots, surface, i)
+            sky = other.sky_again(slots, surface, i)[0]
         limited = other.light.limited(slots, surface)
         if other.sources.count <= ALL_SOURCES:
             return sky, other.light.mean(range(other.sources.count), slots, surface), limited
@@ -69,9 +69,9 @@ def light_again(cache: SurfaceCache, progress: Progress) -> None:
             return cache.met_again(texels)
         slots, surface = cache.table.slots[texels], cache.sampler.on_texels(texels, cache.points)
         none = np.zeros((len(texels), 3), np.float32)
-        sky = none if context.environment.is_black else cache.sky_again(slots, surface, i)
+        sky, halves = (none, none) if context.environment.is_black else cache.sky_again(slots, surface, i)
         return TexelRows(sky, none, *cache.light.direct(slots, surface), rows.albedo[texels], rows.translucency[texels],
-                         rows.opposite[texels], cache.light.limited(slots, surface))
+                         rows.opposite[texels], cache.light.limited(slots, surface), halves)
 
     parts = parallel_for(work, len(spans), context.threads, progress, "light on the surface cache")
     found = TexelRows.none(len(cache.light.limits), cache.light.choices).followed_by(parts)

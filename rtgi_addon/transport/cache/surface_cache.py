@@ -96,6 +96,7 @@ class SurfaceCache:
         self.sampler = TexelSampler(context, layout, self.table, self.numbers)
         self.bright = BrightSurfaces(context)
         self.irradiance_rest, self.first_bounce = np.zeros((1, 3), np.float32), self._no_bounce()
+        self.bounce_halves = np.zeros((1, 3), np.float32)
         self.solved = 0
         self.emitter_samples = min(EMITTER_SAMPLES, self.points) if samples_emitters(context) else 0
 
@@ -158,10 +159,11 @@ class SurfaceCache:
         rays, limits = self._rays(slots, surface)
         found, primitive, cosine_hit, density, tints = rays.found, rays.primitive, rays.cosine, rays.density, rays.tint
         surface_hits = SurfaceHits(primitive, rays.u, rays.v, rays.slots)
-        sky = self._sky(rays.directions, rays.escaped, n, tints)
+        sky, halves = self._sky(rays.directions, rays.escaped, n, tints)
         emission = np.zeros((n, 3), np.float32)
         if self.context.surfaces.has_emission:
-            emission = self._emission_of_hits(surface_hits, -cosine_hit, found, density[found], surface, tints)
+            emission, apart = self._emission_of_hits(surface_hits, -cosine_hit, found, density[found], surface, tints)
+            halves = halves + apart
         if self.emitter_samples:
             emission = emission + self._sample_emitters(slots, surface)
         if self.walks_media:
@@ -173,7 +175,8 @@ class SurfaceCache:
                 surface_hits = SurfaceHits.join([surface_hits, ends.hits])
                 density, tints = np.append(density, ends.density), np.concatenate([tints, ends.tints])
         rows = TexelRows(sky, emission, *self.light.direct(slots, surface), self._mean_albedo(slots, surface),
-                         self._mean_translucency(slots, surface), np.full((n, 1), -1, np.int32), self.light.limited(slots, surface))
+                         self._mean_translucency(slots, surface), np.full((n, 1), -1, np.int32), self.light.limited(slots, surface),
+                         halves)
         angles = None
         if self.context.surfaces.albedo_by_angle.present:
             face = self.context.surfaces.face(primitive, -cosine_hit)
@@ -230,7 +233,8 @@ class SurfaceCache:
         return directions, np.flatnonzero(escaped & (dot(face, directions) > 0)), tints
 
     def sky_again(self, slots: np.ndarray, surface: SurfacePoints, block: int) -> np.ndarray:
-        """Irradiance (n, 3) of the world on the texels with ``slots`` (n,), those of a ``block`` of the form factors."""
+        """Irradiance of the world on the texels with ``slots`` (n,), those of a ``block`` of the form factors, and by how much more
+        that is by the first half of their rays than by the second: (2, n, 3)."""
         directions, escaped, tints = self.escaped_again(slots, surface, block)
         return self._sky(directions, escaped, len(slots), tints)
 
@@ -239,16 +243,23 @@ class SurfaceCache:
         return self._trace(texels).rows
 
     def _sky(self, directions, escaped, n: int, tints: np.ndarray | None) -> np.ndarray:
+        """As ``_mean_over_rays``."""
         if escaped.size == 0 or self.context.environment.is_black:
-            return np.zeros((n, 3), np.float32)
+            return np.zeros((2, n, 3), np.float32)
         radiance = self.context.environment.base_radiance(directions[escaped])
         return self._mean_over_rays(escaped, radiance if tints is None else radiance * tints[escaped], n)
 
     def _mean_over_rays(self, rows, radiance, n: int) -> np.ndarray:
-        """π × the mean over each texel's rays of ``radiance`` on ``rows``: an irradiance (n, 3)."""
+        """π × the mean over each texel's rays of ``radiance`` on ``rows``, an irradiance, and by how much more that is of the first
+        half of them than of the second: (2, n, 3)."""
         full = np.zeros((self.rays * n, 3), np.float32)
         full[rows] = radiance
-        return full.reshape(self.rays, n, 3).sum(axis=0) * np.float32(np.pi / self.rays)
+        return self._of_halves(full.reshape(self.rays, n, 3))
+
+    def _of_halves(self, radiance: np.ndarray) -> np.ndarray:
+        """As ``_mean_over_rays`` of ``radiance`` (R, n, 3)."""
+        first, second = radiance[:self.rays // 2].sum(axis=0), radiance[self.rays // 2:].sum(axis=0)
+        return np.stack([first + second, 2.0 * (first - second)]) * np.float32(np.pi / self.rays)
 
     def _mean_albedo(self, slots: np.ndarray, surface: SurfacePoints) -> np.ndarray:
         if self.context.surfaces.has_uniform_albedo:
@@ -291,14 +302,17 @@ class SurfaceCache:
         return irradiance.reshape(m, n, 3).sum(axis=0)
 
     def _sample_bright(self, texels: np.ndarray) -> np.ndarray:
-        """Irradiance (n, 3) of the bright surfaces' first reflection, balanced against the rays that hit them."""
+        """Irradiance of the bright surfaces' first reflection, balanced against the rays that hit them, and by how much more
+        that is of every other sample, from the first on: (2, n, 3)."""
         m, n = min(TEXEL_SAMPLES, self.points), len(texels)
         surface = self.sampler.on_texels(texels, m)
         jitter = self.numbers.of(self.table.slots[texels], BRIGHT_CHOICE, m)[..., 0]
         numbers = (np.arange(m, dtype=np.float32)[:, None] + jitter) / np.float32(m)
         _, irradiance = self.bright.connect(numbers.reshape(-1), surface.points, m, self.rays / np.pi,
                                             (surface.shading, surface.face))
-        return irradiance.reshape(m, n, 3).sum(axis=0)
+        irradiance = irradiance.reshape(m, n, 3)
+        first, second = irradiance[::2].sum(axis=0), irradiance[1::2].sum(axis=0)
+        return np.stack([first + second, 2.0 * (first - second)])
 
     def solve(self, bounces: int | None, tolerance: float, progress: Progress, bright: bool = True,
               start: np.ndarray | None = None) -> None:
@@ -314,7 +328,7 @@ class SurfaceCache:
             looked_at = self.count if bright else 0
             self.bright = find_bright(self.context, self.layout, self.table.slots[:looked_at], self._reflected()[:looked_at],
                                       self._light_at, self.numbers.seed)
-            self.first_bounce = self._no_bounce()
+            self.first_bounce, self.bounce_halves = self._no_bounce(), np.zeros((1, 3), np.float32)
         self.bright.cover(self.table.slots)
         fixed = self.rows.irradiance_sky + self.rows.irradiance_emission
         if start is not None and bounces is None and not self.bright.count and not self.light.limits:
@@ -367,15 +381,19 @@ class SurfaceCache:
             if by_limit:
                 # The pool of bright points does not tell whose light it is.
                 seen = [self.form_factors.seen(i, leaving, by_angle).sum(axis=0) for leaving in (unlimited, *by_limit)]
-                return np.concatenate(seen, axis=1) * np.float32(np.pi / self.rays)
+                return np.concatenate(seen, axis=1) * np.float32(np.pi / self.rays), np.zeros((block.shape[1], 3), np.float32)
             incoming = self.form_factors.seen(i, radiance, by_angle)
             if not self.bright.count:
-                return incoming.sum(axis=0) * np.float32(np.pi / self.rays)
+                return of_halves(incoming)
             by_light = min(TEXEL_SAMPLES, self.points) * np.take(self.bright.pdf_area, block, mode="wrap")
             weight = np.where(by_light > 0, self.rays * density / np.maximum(self.rays * density + by_light, 1e-30), 1)
-            hit = np.einsum("rnc,rn->nc", incoming, weight) * np.float32(np.pi / self.rays)
-            return hit + self._sample_bright(np.arange(spans[i].start, spans[i].stop))
+            return of_halves(incoming * weight[:, :, None]) + self._sample_bright(np.arange(spans[i].start, spans[i].stop))
+
+        def of_halves(incoming):
+            # Walks in media follow the rays.
+            return sum(self._of_halves(part) for part in incoming.reshape(-1, self.rays, *incoming.shape[1:]))
 
         blocks = range(start, len(spans))
         parts = parallel_for(lambda k: work(blocks[k]), len(blocks), self.context.threads, progress, "light from bright surfaces")
-        return np.concatenate([self.first_bounce[:-1], *parts, self.first_bounce[-1:]])
+        self.bounce_halves = np.concatenate([self.bounce_halves[:-1], *(part[1] for part in parts), self.bounce_halves[-1:]])
+        return np.concatenate([self.first_bounce[:-1], *(part[0] for part in parts), self.first_bounce[-1:]])

@@ -15,7 +15,8 @@ class TexelRows:
     one over their probability, (n, 0) where all sources are sampled anyway; mean ``albedo`` (n, 3), and ``translucency`` (n, 3) to
     light from the other side, whose texel is ``opposite`` (n, 1) int32 (−1: none where nothing passes);
     ``irradiance_limited`` (n, g, 3), the part of the direct light that may be reflected so often alone, for each of the
-    ``TexelLight.limits``.
+    ``TexelLight.limits``; ``halves`` (n, 3), by how much the first half of the rays says more of world and emission than
+    the second.
     """
 
     irradiance_sky: np.ndarray
@@ -28,6 +29,7 @@ class TexelRows:
     translucency: np.ndarray
     opposite: np.ndarray
     irradiance_limited: np.ndarray
+    halves: np.ndarray
 
     @staticmethod
     def none(limits: int = 0, choices: int = 0) -> "TexelRows":
@@ -35,7 +37,7 @@ class TexelRows:
         dark = np.zeros((1, 3), np.float32)
         return TexelRows(dark, dark, dark, np.ones((1, 1), bool), np.zeros((1, choices), np.int16),
                          np.zeros((1, choices), np.float32), dark, dark, np.full((1, 1), -1, np.int32),
-                         np.zeros((1, limits, 3), np.float32))
+                         np.zeros((1, limits, 3), np.float32), dark)
 
     @property
     def count(self) -> int:
