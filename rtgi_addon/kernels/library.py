@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 # As in src/library.c: goes up whenever a function's arguments or a structure change.
-VERSION = 3
+VERSION = 4
 # The package of the wheel that carries the library, and the library's name in it.
 PACKAGE = "rtgi_kernels"
 FILE = {"win32": f"{PACKAGE}.dll", "darwin": f"{PACKAGE}.dylib"}.get(sys.platform, f"{PACKAGE}.so")

@@ -3,7 +3,7 @@
 #include "rtgi.h"
 
 /* Goes up whenever a function's arguments or a structure change: Python refuses any other. */
-#define VERSION 3
+#define VERSION 4
 
 EXPORT int32_t rtgi_version(void)
 {
