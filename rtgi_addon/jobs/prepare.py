@@ -101,7 +101,7 @@ def prepare_scene(scene: Scene, technique: str = "probes", overrides: dict | Non
         progress.stage("write")
         progress.step(_ESTIMATED, f"Writing {target.name}")
         document, arrays = encode(scene)
-        said = {"lamps": lamp_roles(scene, common), "objects": object_roles(scene), "notes": list(scene.notes),
+        said = {"lamps": lamp_roles(scene, common), "objects": object_roles(scene), "notes": [*scene.notes, *common.notes],
                 "warnings": warnings, "not_followed": [concern.to_json() for concern in not_followed],
                 "direct_lamps": sorted(common.direct_lamps)}
         write_folder(PREPARED, place, plain({

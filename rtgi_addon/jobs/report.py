@@ -151,6 +151,10 @@ def lattice_warning(field: Field) -> str | None:
     if all(grid.fitted for grid in field.grids()):
         return (f"light on surfaces is off by some {value}, and noise at the probes ({noise}) is not why, they lie too far apart: "
                 "have a finer lattice planned (rtgi plan, Plan Bake)")
+    if field.stats.get("near_emitters", {}).get("at_pixels"):
+        return (f"light on surfaces is off by some {value}, and noise at the probes ({noise}) is not why, they lie too far apart: "
+                "fit them to surfaces (--fit, Fit to Surfaces; RTGI's pictures then no longer draw what glows close by at each "
+                "pixel), or have a finer lattice planned (rtgi plan, Plan Bake)")
     return (f"light on surfaces is off by some {value}, and noise at the probes ({noise}) is not why, they lie too far apart: "
             "fit them to surfaces (--fit, Fit to Surfaces), or have a finer lattice planned (rtgi plan, Plan Bake)")
 

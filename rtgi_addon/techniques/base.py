@@ -314,7 +314,7 @@ KNOWN_LIGHT = frozenset({"lamps", "emissive surfaces", "world", "bounces"})
 class Common(NamedTuple):
     """What all blocks of a bake have in common: ``arrays`` by name; what the finished field is held to (``truth``, arrays by name);
     world positions (n, 3) of the ``usable`` probes, and for each volume the share of those ``in_the_open`` (ProbeGrid);
-    ``direct_lamps`` as of the finished Field; the number of ``blocks``."""
+    ``direct_lamps`` and ``notes`` as of the finished Field; the number of ``blocks``."""
 
     arrays: dict[str, np.ndarray]
     truth: dict[str, np.ndarray]
@@ -322,6 +322,7 @@ class Common(NamedTuple):
     in_the_open: tuple[float, ...]
     direct_lamps: frozenset[str]
     blocks: int
+    notes: tuple[str, ...] = ()
 
 
 class BakeBlocks(Protocol):

@@ -127,12 +127,15 @@ def test_sentences_that_no_pattern_of_the_source_shows(german, monkeypatch):
     from rtgi_addon import kernels
     from rtgi_addon.evaluate.leaks import Cause
     from rtgi_addon.techniques.lattice.fit import describe
+    from rtgi_addon.techniques.lattice.near_notes import NearGlow, notes_on
     from rtgi_addon.transport.rays import choose, embree
     said = [cause.text for cause in Cause if cause is not Cause.NONE] + ["3 of 2,000 receivers leak", "Relighting"]
     said.append(describe(scene_builders.closed_box().volumes[0]))
     said += ["effect 'mist' has no setting 'x': choose one of start, depth"]
     said += ["'Probes' goes from 4 x 4 x 4 to 8 x 6 x 4 probes: finer.", "rsm leaves out the light of the world",
              "SH of order 2, 9 numbers a channel: the lattice is off by 4 % with it, which is more than is asked for."]
+    for why in ("probes are fitted", "the scene has media", "light is linked to objects", "a volume does not capture all light"):
+        said += [why, *notes_on(NearGlow((), ("Tube",), why))]
     with kernels.switched_off():
         said.append(choose.slow_rays_warning())
     monkeypatch.setattr(embree, "rtcore_scene", None)

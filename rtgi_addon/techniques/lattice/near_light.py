@@ -5,7 +5,7 @@ form, as that of lamps is. Here is which surfaces it is worth it for, what probe
 that; what they give by way of other surfaces stays in the probes.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -14,7 +14,7 @@ import numpy as np
 from ...numerics import sh
 from ...numerics.grid import box_distance, cell_size, lattice_points
 from ...numerics.sampling import about, cosine_hemisphere, hash_u32, sobol_owen, sobol_owen_at, unit_interval, wrapped
-from ...scene import Material, Scene, baked_part
+from ...scene import Material, ProbeVolume, Scene, baked_part
 from ...transport.context import LightContext
 from ...transport.lights.pane_faces import flat_faces
 from ...transport.lights.panes import Panes, sample_triangle
@@ -35,6 +35,7 @@ _RAYS, _SAMPLES, _FEW, _FAR = 256, 128, 16, 4.0
 _PAIRS = 1 << 18
 # What is taken from probes may be this share more than they hold: beyond, it is not the light that they were baked in.
 _STALE = 0.02
+_TINY, _ROUNDED = 1e-30, 1e-3
 _SEED, _PROBE_SEED, _SHARE_SEED = 0x3000, 0x3100, 0x3200
 
 
@@ -79,10 +80,12 @@ class NearLight:
         return result
 
 
-class _Emitter(NamedTuple):
-    """An instance's surfaces of one material: its panes, and what of their light falls close by [W]."""
+class NearEmitter(NamedTuple):
+    """An ``instance``'s surfaces of one ``material`` (indices): their panes, and what of their light falls close by [W]."""
 
     name: str
+    instance: int
+    material: int
     panes: Panes
     near: float
 
@@ -101,15 +104,27 @@ def near_light(context: LightContext, field: Field | None) -> NearLight | None:
 
 def may_have_near_light(scene: Scene, field: Field | None) -> bool:
     """Whether ``near_light`` need be asked at all: a look at what is known without rays."""
-    if type(field) is not ProbeField or scene.media or any(item.linking is not None for item in scene.instances):
+    if type(field) is not ProbeField:
         return False
-    if any(grid.fitted or not grid.volume.captures_all for grid in field.grids()):
+    volumes = (*scene.volumes, *(grid.volume for grid in field.grids()))
+    if why_not(scene, volumes, any(grid.fitted for grid in field.grids())):
         return False
     even = np.flatnonzero([_is_even(material) for material in scene.materials])
-    if not even.size or not all(volume.captures_all for volume in scene.volumes):
+    if not even.size:
         return False
     few = [0 < np.count_nonzero(np.isin(mesh.triangle_material, even)) for mesh in scene.meshes]
     return any(few[item.mesh] or item.material_override for item in scene.instances)
+
+
+def why_not(scene: Scene, volumes: Sequence[ProbeVolume], fitted: bool) -> str:
+    """Why nothing in ``scene`` is lit so beside probes of ``volumes`` that are ``fitted`` or not; "" where something may be."""
+    if fitted:
+        return "probes are fitted"
+    if scene.media:
+        return "the scene has media"
+    if any(item.linking is not None for item in scene.instances):
+        return "light is linked to objects"
+    return "" if all(volume.captures_all for volume in volumes) else "a volume does not capture all light"
 
 
 def _near_light(context: LightContext, field: Field) -> NearLight | None:
@@ -118,7 +133,7 @@ def _near_light(context: LightContext, field: Field) -> NearLight | None:
     baked = context
     if baked_part(context.scene) is not context.scene:
         baked = LightContext(context.scene, context.threads)
-    chosen = _chosen(baked, field)
+    chosen = near_emitters(baked, [lookup.volume for lookup in field.lookups])
     if not chosen:
         return None
     panes = Panes(np.concatenate([item.panes.corners for item in chosen]), np.concatenate([item.panes.radiance for item in chosen]))
@@ -128,9 +143,10 @@ def _near_light(context: LightContext, field: Field) -> NearLight | None:
     return NearLight(panes, tuple(dict.fromkeys(item.name for item in chosen)), held, left_of(field, held))
 
 
-def _chosen(context: LightContext, field: ProbeField) -> list[_Emitter]:
-    """Emitters worth it, by what they give close by, as many as MOST_PANES allows."""
-    found = sorted((item for item in _emitters(context, field) if item.near >= WORTH * context.emitters.total_power),
+def near_emitters(context: LightContext, volumes: Sequence[ProbeVolume]) -> list[NearEmitter]:
+    """Emitters worth it beside probes of ``volumes``, finest cells first, by what they give close by, as many as MOST_PANES
+    allows."""
+    found = sorted((item for item in _emitters(context, volumes) if item.near >= WORTH * context.emitters.total_power),
                    key=lambda item: -item.near)
     kept, count = [], 0
     for item in found:
@@ -140,20 +156,36 @@ def _chosen(context: LightContext, field: ProbeField) -> list[_Emitter]:
     return kept
 
 
-def _emitters(context: LightContext, field: ProbeField) -> Iterator[_Emitter]:
-    geometry, scene = context.geometry, context.scene
-    emissive = np.flatnonzero(context.surfaces.emissive[geometry.material] & (geometry.areas > 0))
-    for instance, material in np.unique(np.stack([geometry.instance[emissive], geometry.material[emissive]]), axis=1).T:
-        item = scene.instances[instance]
-        if not (_is_even(scene.materials[material]) and item.visible_diffuse and item.visible_shadow):
+def _emitters(context: LightContext, volumes: Sequence[ProbeVolume]) -> Iterator[NearEmitter]:
+    geometry, surfaces, scene = context.geometry, context.surfaces, context.scene
+    even = np.array([_is_even(material) for material in scene.materials], bool)
+    emissive = np.flatnonzero((surfaces.emissive & even)[geometry.material] & (geometry.areas > 0)).astype(np.int32)
+    owners, row = np.unique(np.stack([geometry.instance[emissive], geometry.material[emissive]]), axis=1, return_inverse=True)
+    order = np.argsort(row.reshape(-1), kind="stable")
+    ends, least = np.cumsum(np.bincount(row.reshape(-1), minlength=owners.shape[1])), WORTH * context.emitters.total_power
+    # With the insides of solids: of many small emitters most need no closer look.
+    most = np.bincount(row.reshape(-1), np.pi * geometry.areas[emissive] * _both_sides(context, emissive), owners.shape[1])
+    for number in np.flatnonzero(most >= (1.0 - _ROUNDED) * least):
+        (instance, material), first = owners[:, number], ends[number - 1] if number else 0
+        item, primitive = scene.instances[instance], emissive[order[first:ends[number]]]
+        if not (item.visible_diffuse and item.visible_shadow):
             continue
-        primitive = emissive[(geometry.instance[emissive] == instance) & (geometry.material[emissive] == material)]
         if len(primitive) > MOST_TRIANGLES:
             continue
         panes = _panes(context, primitive)
-        share = _near_share(context, panes, instance, _spacing(field, panes.corners.mean(axis=(0, 1))))
+        power = np.pi * float(panes.areas.sum(axis=1) @ luminance(panes.radiance))
+        if not power >= max(least, _TINY):
+            continue
+        share = _near_share(context, panes, instance, spacings(volumes, panes.corners.mean(axis=(0, 1))[None])[0])
         if share >= NEAR_SHARE:
-            yield _Emitter(item.name, panes, share * np.pi * float(panes.areas.sum(axis=1) @ luminance(panes.radiance)))
+            yield NearEmitter(item.name, int(instance), int(material), panes, share * power)
+
+
+def _both_sides(context: LightContext, primitive: np.ndarray) -> np.ndarray:
+    """Luminance (t,) of what both sides of even triangles (t,) emit."""
+    middle = np.full(len(primitive), np.float32(1 / 3))
+    return sum(luminance(context.surfaces.emission_of_side(primitive, middle, middle, np.full(len(primitive), side, np.float32)))
+               for side in (1.0, -1.0))
 
 
 def _panes(context: LightContext, primitive: np.ndarray) -> Panes:
@@ -175,8 +207,6 @@ def _panes(context: LightContext, primitive: np.ndarray) -> Panes:
 def _near_share(context: LightContext, panes: Panes, instance: int, reach: float) -> float:
     """Share of what ``panes`` of ``instance`` emit that falls on others within ``reach`` [m]."""
     power = (panes.areas * luminance(panes.radiance)[:, None]).reshape(-1)
-    if not power.sum() > 0:
-        return 0.0
     u = sobol_owen(_RAYS, 5, _SHARE_SEED)
     chosen = np.minimum(np.searchsorted(np.cumsum(power) / power.sum(), u[:, 0], side="right"), len(power) - 1)
     a, b, c = np.moveaxis(panes.triangles.reshape(-1, 3, 3)[chosen], 1, 0)
@@ -189,14 +219,15 @@ def _near_share(context: LightContext, panes: Panes, instance: int, reach: float
     return float(np.mean(met & (context.geometry.instance[np.maximum(hits.primitive, 0)] != instance)))
 
 
-def _spacing(field: ProbeField, place: np.ndarray) -> float:
-    """How far [m] probes are apart around ``place`` (3,): of the finest volume that reaches there."""
-    spacings = []
-    for lookup in field.lookups:
-        spacings.append(float(cell_size(lookup.volume.world_from_local, lookup.volume.nodes).max()))
-        if box_distance(lookup.volume.world_from_local, place[None])[0] <= spacings[-1]:
-            break
-    return spacings[-1]
+def spacings(volumes: Sequence[ProbeVolume], places: np.ndarray) -> np.ndarray:
+    """How far (n,) [m] probes are apart around ``places`` (n, 3): of the first of ``volumes``, finest cells first, that reaches
+    there, else of the last."""
+    result, reached = np.zeros(len(places)), np.zeros(len(places), bool)
+    for volume in volumes:
+        own = float(cell_size(volume.world_from_local, volume.nodes).max())
+        result[~reached] = own
+        reached |= box_distance(volume.world_from_local, places) <= own
+    return result
 
 
 def _is_even(material: Material) -> bool:

@@ -20,6 +20,7 @@ from ..base import Checkpoint, Field, Technique, begin_bake, volumes_by_settings
 from ..lamp_light import LampLight
 from ..lattice.dilation import dilate
 from ..lattice.field import ProbeField
+from ..lattice.near_notes import near_glow, notes_on
 from .bake import Begun, ProbeBake
 from .blocks import PROBE_BLOCKS
 from .captured import LAMP_SAMPLES, capturing, lamp_light_of
@@ -76,6 +77,10 @@ class Probes(Technique):
         field = _field(context, settings, seed, scene.volumes, bakes, grids)
         error = error_on_surfaces([bake for bake, _ in bakes], field, progress.span(CHECKED_FROM, 1.0))
         field.stats["error_on_surfaces"] = None if error is None else error.to_json()
+        glow = near_glow(context, scene.volumes, any(grid.fitted for grid in field.grids()))
+        field.notes = notes_on(glow)
+        if field.notes:
+            field.stats["near_emitters"] = glow.to_json()
         return field
 
     def sweep(self) -> tuple[ProbeSettings, ...]:

@@ -22,6 +22,7 @@ from ...transport.context import LightContext
 from ...transport.parallel import parallel_for
 from ..base import BACKFACE_THRESHOLD, Checkpoint, Common, begin_bake, volumes_by_settings
 from ..lattice.coverage import require_open
+from ..lattice.near_notes import near_glow, notes_on
 from ..lattice.placement import Placement, place
 from .bake import BATCH_RAYS, Block, ProbeBake, surface_cache
 from .block_field import BlockField, Bricks, Read
@@ -157,7 +158,8 @@ class ProbeBlocks:
             held |= group.lamp_light.names
             count += len(Bricks(volumes))
         return Common(arrays, Truth.join(truths)._asdict(), np.concatenate(usable),
-                      tuple(opened[id(volume)] for volume in scene.volumes), held, count)
+                      tuple(opened[id(volume)] for volume in scene.volumes), held, count,
+                      notes_on(near_glow(context, scene.volumes)))
 
     def begin(self, scene: Scene, settings: ProbeSettings, rng: np.random.Generator, arrays: Mapping[str, np.ndarray],
               threads: int | None = None) -> PreparedBlocks:

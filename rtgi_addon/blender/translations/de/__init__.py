@@ -5,6 +5,7 @@ tooltips come in to `interface` and `settings`, what comes from below the panel 
 from .atlas import ATLAS, ATLAS_LABELS
 from .cycles import CYCLES
 from .files import FILES
+from .glow import GLOW
 from .guidance import LABELS, MESSAGES
 from .interface import INTERFACE as _INTERFACE
 from .live import LIVE, LIVE_LABELS
@@ -28,4 +29,4 @@ INTERFACE: dict[str, str] = {**_INTERFACE, **SETTINGS, **ROLES, **LABELS, **STYL
                              **LIVE_LABELS, **VOXEL_LABELS, **ATLAS_LABELS,
                              **SCATTERED_LABELS}
 SENTENCES: dict[str, str] = {**_SENTENCES, **PLANS, **CYCLES, **READING, **MEDIA, **FILES, **STORAGE, **MESSAGES, **STYLE_SENTENCES,
-                             **TRANSFER, **SPHERES, **LIVE, **TRAVEL, **VOXELS, **ATLAS, **SCATTERED}
+                             **TRANSFER, **SPHERES, **LIVE, **TRAVEL, **VOXELS, **ATLAS, **SCATTERED, **GLOW}
