@@ -27,7 +27,7 @@ def test_every_sobol_dimension_is_stratified():
 
 def test_unscrambled_sobol_matches_joe_and_kuo():
     """Points as scipy.stats.qmc.Sobol(16, scramble=False) gives them (its Gray-code order undone), times 1024."""
-    tables = sampling._sobol_tables()
+    tables = sampling.sobol_tables()
     raw = sampling._reverse_bits(tables[:, 0, 683 & 255] ^ tables[:, 1, 683 >> 8]) / 2.0**22
     assert raw.tolist() == [853, 271, 855, 841, 123, 381, 787, 29, 437, 411, 203, 505, 569, 117, 663, 671]
     assert (sampling._reverse_bits(tables[2, 0, :9]) / 2.0**28).tolist() == [0, 8, 12, 4, 6, 14, 10, 2, 9]
