@@ -39,7 +39,7 @@ charts: setup        ## charts, sheets beside Cycles, plans and stability of eve
 	$(PYTHON) -m rtgi_addon stability --out benchmarks/results/stability
 	$(PYTHON) benchmarks/plan.py --threads 1
 
-bench: setup         ## measure again what benchmarks/README.md says
+bench: setup         ## measure again what benchmarks/measured says
 	$(PYTHON) benchmarks/tables.py --minutes 600
 	$(PYTHON) benchmarks/without_embree.py
 	$(PYTHON) benchmarks/bake_vs_cycles.py

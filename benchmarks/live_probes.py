@@ -3,7 +3,7 @@
     python benchmarks/live_probes.py [--rays 8192 32768 131072] [SCENE.blend …]
 
 Times are of the processor, with one thread: what a frame takes by the clock is that over the cores. Frames and errors do not depend
-on the machine. Results: benchmarks/README.md, "Live probes".
+on the machine. Results: benchmarks/measured/techniques.md, "Live probes".
 """
 
 import argparse

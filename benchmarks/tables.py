@@ -1,4 +1,4 @@
-"""The tables of benchmarks/README.md in one go, on one commit: runs one script after the other and keeps what each prints.
+"""The tables of benchmarks/measured in one go, on one commit: runs one script after the other and keeps what each prints.
 
     python benchmarks/tables.py [--only NAME…] [--skip NAME…] [--minutes 30] [--list] [--tiny]
 
@@ -28,7 +28,7 @@ _IDLE = 0.3
 
 
 class Table(NamedTuple):
-    """One table: the ``section`` of the README that it is for, the script with its arguments, the minutes that it takes, and the
+    """One table: the ``section`` of benchmarks/measured that it is for, the script with its arguments, the minutes that it takes, and the
     arguments of a ``tiny`` run."""
 
     section: str

@@ -22,7 +22,7 @@ _AROUND = 1
 _ONE_LOOK = 0.08
 # Pixels that seem good by chance have no more samples, and light that is shared between pixels is off by more than its noise.
 # Against 200 samples everywhere, which are noisy as well, pictures of five scenes at 6 to 2 % were off by 0.8 to 1.4 times what
-# pixels seemed to be off together, by 1.0 times in the mean (benchmarks/README.md, "Pictures by rays against Cycles").
+# pixels seemed to be off together, by 1.0 times in the mean (benchmarks/measured/rays.md).
 _LUCK = 1.3
 # The part of the square of the allowed error that pixels with room for samples may make up, whatever the others leave of it.
 _LEAST_PART = 0.25

@@ -18,6 +18,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+MEASURED = sorted(path.relative_to(ROOT).as_posix() for path in [*ROOT.glob("benchmarks/*.md"), *ROOT.glob("benchmarks/measured/*.md")])
 FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 # Fences that hold neither commands nor Python.
 OTHER = {"text"}
@@ -132,7 +133,7 @@ def test_every_target_of_make_is_there():
     assert asked and asked <= targets
 
 
-@pytest.mark.parametrize("page", ["benchmarks/README.md", "README.md", "CONTRIBUTING.md"])
+@pytest.mark.parametrize("page", ["README.md", "CONTRIBUTING.md", *MEASURED])
 def test_scripts_that_are_named_are_there_and_take_their_options(page):
     """Benchmarks take minutes to hours; that they exist and know the options given to them is all that is asked here."""
     text = (ROOT / page).read_text(encoding="utf-8")

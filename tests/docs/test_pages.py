@@ -12,7 +12,7 @@ from rtgi_addon.exchange import engines
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", ROOT / "benchmarks/README.md",
-         *sorted((ROOT / "docs").rglob("*.md"))]
+         *sorted((ROOT / "docs").rglob("*.md")), *sorted((ROOT / "benchmarks/measured").glob("*.md"))]
 LINK = re.compile(r"(?<!`)!?\[[^\]]*\]\(([^)\s]+)\)")
 
 
@@ -40,10 +40,11 @@ def test_links_lead_somewhere(page):
 
 
 def test_every_page_is_in_the_index():
-    index = (ROOT / "docs/README.md").read_text(encoding="utf-8")
-    for page in PAGES[4:]:
-        name = page.relative_to(ROOT / "docs").as_posix()
-        assert name == "README.md" or f"({name})" in index, name
+    for folder, below in ((ROOT / "docs", "**/*.md"), (ROOT / "benchmarks", "measured/*.md")):
+        index = (folder / "README.md").read_text(encoding="utf-8")
+        for page in folder.glob(below):
+            name = page.relative_to(folder).as_posix()
+            assert name == "README.md" or f"({name})" in index, name
 
 
 def test_every_picture_is_shown_somewhere():
