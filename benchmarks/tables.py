@@ -28,8 +28,8 @@ _IDLE = 0.3
 
 
 class Table(NamedTuple):
-    """One table: the ``section`` of benchmarks/measured that it is for, the script with its arguments, the minutes that it takes, and the
-    arguments of a ``tiny`` run."""
+    """One table: the ``section`` of benchmarks/measured that it is for, the script with its arguments, the minutes that it takes,
+    and the arguments of a ``tiny`` run."""
 
     section: str
     command: str

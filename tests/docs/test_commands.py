@@ -18,7 +18,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
-MEASURED = sorted(path.relative_to(ROOT).as_posix() for path in [*ROOT.glob("benchmarks/*.md"), *ROOT.glob("benchmarks/measured/*.md")])
+MEASURED = sorted(path.relative_to(ROOT).as_posix() for folder in ("benchmarks", "benchmarks/measured")
+                  for path in (ROOT / folder).glob("*.md"))
 FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 # Fences that hold neither commands nor Python.
 OTHER = {"text"}
