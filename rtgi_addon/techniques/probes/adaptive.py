@@ -37,8 +37,8 @@ LEAST_GAIN, MOST_GAIN = 0.2, 1.0
 # Weight of what earlier rounds said of a probe's error in what the next one makes of it.
 REMEMBERED = 0.5
 # Share of the target that is aimed at by the noise of probe rays and of the surface cache together, and what is left to probe rays
-# at least, however noisy the cache is: what is told of it is too much where it is most (atrium 0.89 to 1.03 % for 0.78 to 0.82), and
-# with half of the target left rays there were 1.6 times as many.
+# at least, however noisy the cache is: what is told of it is too much where it is most (atrium 0.89 to 1.03 % for 0.78 to 0.82),
+# and with half of the target left rays there were 1.6 times as many.
 AIM, LEAST_SHARE = 0.8, 0.7
 # What is left to probe rays usually: by that their numbers are told before the cache's noise is known.
 SAMPLING_SHARE = 0.75
