@@ -4,7 +4,7 @@
 #include "include/voxel_sky.glsl"
 
 // Of receivers in a grid, at a place in its cells.
-vec3 march_irradiance(int grid, vec3 start, vec3 position_world, vec3 normal_world)
+vec3 grid_irradiance(int grid, vec3 start, vec3 position_world, vec3 normal_world)
 {
   // The same rays for the same place, whoever else is asked about.
   uint state = HASH_START;
@@ -37,16 +37,4 @@ vec3 march_irradiance(int grid, vec3 start, vec3 position_world, vec3 normal_wor
   return 3.14159265 * sum / float(indirect.rays) + voxel_bright_sky(grid, start, normal_world);
 }
 
-vec3 indirect_irradiance(vec3 position_world, vec3 normal_world)
-{
-  vec3 start = (position_world - indirect.corner.xyz) / indirect.corner.w;
-  vec3 sum = vec3(0.0);
-  float left = 1.0;
-  for (int grid = 0; grid < VOXEL_GRIDS && left > 0.0; grid++) {
-    float share = voxel_share(grid, start, left);
-    if (share > 0.0) {
-      sum += share * march_irradiance(grid, voxel_place(0, grid, start), position_world, normal_world);
-    }
-  }
-  return sum;
-}
+#include "include/irradiance_grids.glsl"
